@@ -1,0 +1,2 @@
+//! The toposlam command.
+fn main() {}

@@ -1,0 +1,105 @@
+//! Everything that can go wrong while the robot runs, by kind, and how often it did.
+
+/// A kind of fault. Faults are counted and reported; none of them ends the mapping or loses a map.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+#[repr(u8)]
+#[non_exhaustive]
+pub enum FaultKind {
+    /// A sonar did not answer in time.
+    SonarSilent = 0,
+    /// A sonar answered with a value outside what its data sheet allows.
+    SonarNonsense = 1,
+    /// The sensor bus reported an error in the middle of a frame.
+    BusError = 2,
+    /// A ring frame had too few live sensors to look for a place.
+    RingBlind = 3,
+    /// A place had a radius that no fingerprint holds.
+    RadiusOutOfRange = 4,
+    /// A new vertex was wanted and the vertex table is full.
+    VerticesFull = 5,
+    /// A new n-gram was wanted and the n-gram table is full.
+    NgramsFull = 6,
+    /// The history ring is full: the oldest observation was dropped for the newest.
+    HistoryFull = 7,
+    /// The transmit queue was full: a message was dropped (the rolling picture makes up for it).
+    WireFull = 8,
+    /// A frame on the serial line was corrupt, cut or foreign.
+    WireCorrupt = 9,
+}
+
+impl FaultKind {
+    /// Every kind, in the order of its number.
+    pub const ALL: [Self; 10] = [
+        Self::SonarSilent,
+        Self::SonarNonsense,
+        Self::BusError,
+        Self::RingBlind,
+        Self::RadiusOutOfRange,
+        Self::VerticesFull,
+        Self::NgramsFull,
+        Self::HistoryFull,
+        Self::WireFull,
+        Self::WireCorrupt,
+    ];
+}
+
+/// How often each kind of fault was seen since the start; every count saturates.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct FaultCounters {
+    counts: [u32; FaultKind::ALL.len()],
+}
+
+impl FaultCounters {
+    /// All counts at zero.
+    pub const fn new() -> Self {
+        Self { counts: [0; FaultKind::ALL.len()] }
+    }
+
+    /// Counts one more fault of a kind.
+    pub fn count(&mut self, kind: FaultKind) {
+        if let Some(count) = self.counts.get_mut(kind as usize) {
+            *count = count.saturating_add(1);
+        }
+    }
+
+    /// How often a kind was seen.
+    pub fn of(&self, kind: FaultKind) -> u32 {
+        self.counts.get(kind as usize).copied().unwrap_or(0)
+    }
+
+    /// Adds the counts of another stage.
+    pub fn add(&mut self, other: &Self) {
+        for (count, more) in self.counts.iter_mut().zip(other.counts) {
+            *count = count.saturating_add(more);
+        }
+    }
+}
+
+impl Default for FaultCounters {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn kinds_are_numbered_without_gaps() {
+        for (number, kind) in FaultKind::ALL.into_iter().enumerate() {
+            assert_eq!(kind as usize, number);
+        }
+    }
+
+    #[test]
+    fn counts_saturate_and_add_up() {
+        let mut counters = FaultCounters::new();
+        counters.count(FaultKind::BusError);
+        let mut sum = FaultCounters { counts: [u32::MAX; FaultKind::ALL.len()] };
+        sum.add(&counters);
+        assert_eq!(sum.of(FaultKind::BusError), u32::MAX);
+        assert_eq!(counters.of(FaultKind::BusError), 1);
+        assert_eq!(counters.of(FaultKind::WireFull), 0);
+    }
+}

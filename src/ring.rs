@@ -1,0 +1,39 @@
+//! One reading of the whole sonar ring, and where the sensors of the ring look.
+
+/// What one sonar said.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Echo {
+    /// The nearest echo came from this far, in millimetres.
+    Range {
+        /// Distance to the obstacle, in millimetres.
+        range_mm: u16,
+    },
+    /// The sensor works and heard nothing: nothing in range, or the sound was reflected away.
+    Silence,
+    /// The sensor did not answer, or answered nonsense: it says nothing about the world.
+    Dead,
+}
+
+impl Echo {
+    /// The range in millimetres, when there was an echo.
+    pub const fn range_mm(self) -> Option<u16> {
+        match self {
+            Self::Range { range_mm } => Some(range_mm),
+            Self::Silence | Self::Dead => None,
+        }
+    }
+}
+
+/// One reading of a ring of `SONARS` sensors, in the order of the ring's [`RingGeometry`].
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct RingFrame<const SONARS: usize> {
+    /// One echo for each sensor.
+    pub echoes: [Echo; SONARS],
+}
+
+/// Where the sensors of a ring look, counter-clockwise from straight ahead.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct RingGeometry<const SONARS: usize> {
+    /// The bearing of each sensor in milliradians, −3142 to 3142, counter-clockwise positive, 0 straight ahead.
+    pub bearings_mrad: [i16; SONARS],
+}
