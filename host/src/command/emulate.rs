@@ -1,0 +1,11 @@
+//! `toposlam emulate`.
+
+use clap::Args;
+
+/// Arguments of `toposlam emulate`.
+#[derive(Args)]
+pub(crate) struct Arguments {}
+
+pub(crate) fn run(_arguments: &Arguments) -> anyhow::Result<()> {
+    anyhow::bail!("not built yet")
+}

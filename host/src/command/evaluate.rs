@@ -1,0 +1,11 @@
+//! `toposlam evaluate`.
+
+use clap::Args;
+
+/// Arguments of `toposlam evaluate`.
+#[derive(Args)]
+pub(crate) struct Arguments {}
+
+pub(crate) fn run(_arguments: &Arguments) -> anyhow::Result<()> {
+    anyhow::bail!("not built yet")
+}

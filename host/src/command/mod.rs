@@ -1,0 +1,6 @@
+//! The subcommands, a file each: its arguments and what it does with them.
+
+pub(crate) mod emulate;
+pub(crate) mod evaluate;
+pub(crate) mod replay;
+pub(crate) mod simulate;
