@@ -1,1 +1,3 @@
 //! Laptop side.
+
+pub mod evaluation;

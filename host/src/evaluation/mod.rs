@@ -1,0 +1,8 @@
+//! How often maps are right: random paths through known environments, scored against what can be known at best.
+
+pub mod environment;
+pub mod equivalence;
+pub mod graph;
+pub mod report;
+pub mod score;
+pub mod walk;
