@@ -16,7 +16,9 @@
 
 mod fault;
 mod fingerprint;
+mod map;
 pub mod ring;
 
 pub use fault::{FaultCounters, FaultKind};
 pub use fingerprint::{Fingerprint, FingerprintError};
+pub use map::{Map, VerticesFull};
