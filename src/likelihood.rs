@@ -79,7 +79,7 @@ impl Likelihood {
         }
         let behind = self.penalties.get(index + 1).copied().unwrap_or(0);
         let part = (difference & ((1 << self.penalty_stride) - 1)) as i32;
-        at + ((behind - at) * part >> self.penalty_stride)
+        at + (((behind - at) * part) >> self.penalty_stride)
     }
 
     /// How ln of Eq. 9, the price of the size of a map, changes when one vertex gets another label; `None` stands for
