@@ -6,5 +6,6 @@ pub mod equivalence;
 pub mod graph;
 pub mod prior;
 pub mod report;
+pub mod run;
 pub mod score;
 pub mod walk;
