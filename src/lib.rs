@@ -18,6 +18,8 @@ mod fault;
 mod fingerprint;
 mod map;
 pub mod ring;
+#[cfg(feature = "wire")]
+pub mod wire;
 
 pub use fault::{FaultCounters, FaultKind};
 pub use fingerprint::{Fingerprint, FingerprintError};
