@@ -14,13 +14,22 @@
 #![cfg_attr(not(test), no_std)]
 #![forbid(unsafe_code)]
 
+mod consistency;
 mod fault;
+mod filter;
 mod fingerprint;
+mod history;
+mod likelihood;
 mod map;
+mod ngram;
 pub mod ring;
 #[cfg(feature = "wire")]
 pub mod wire;
 
+pub use consistency::{Consistency, Direction, Evidence};
 pub use fault::{FaultCounters, FaultKind};
+pub use filter::{Config, ConfigError, PaperFilter, Particle, Prior, Update, WeightFactors};
 pub use fingerprint::{Fingerprint, FingerprintError};
+pub use history::History;
 pub use map::{Map, VerticesFull};
+pub use ngram::{Ngram, NgramError, NgramLength, NgramTable, NgramsFull};
