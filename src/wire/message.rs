@@ -5,12 +5,13 @@ use core::fmt;
 use serde::{Deserialize, Serialize};
 
 use super::Echoes;
+use crate::Update;
 
 /// The version of the message set; it grows by one whenever messages are appended.
 pub const PROTOCOL_VERSION: u16 = 1;
 
 /// FNV-1a (64 bit) of the description of all messages that `docs/wire.md` prints; a test recomputes it from the types.
-pub const SCHEMA_HASH: u64 = 0;
+pub const SCHEMA_HASH: u64 = 0xAD3E_BE73_35E6_91B9;
 
 /// One message from the robot. All of them state facts in absolute terms; none is an increment.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -142,23 +143,43 @@ pub struct Location {
     pub vertex: u8,
 }
 
-/// Why the inference believes in its map. A value in Q16 nats is a natural logarithm times 65536, saturated.
+impl From<&Update> for Location {
+    fn from(update: &Update) -> Self {
+        Self { place_index: update.place_index, vertex: update.vertex }
+    }
+}
+
+/// Why the inference believes in its map. Logarithms are natural and in units of 2⁻¹⁶ nats.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Evidence {
     /// The number of the place since the start, from 0.
     pub place_index: u32,
-    /// The consistency of map and history (Eq. 2), in millimetres.
+    /// The distance of Eq. 2, or of the half of it that is configured, in millimetres; 65535 when it is infinite.
     pub consistency_mm: u16,
-    /// The logarithm of the winner's observation factor (Eq. 7), in Q16 nats.
-    pub label_q16_nats: i32,
-    /// The logarithm of the winner's consistency factor (Eq. 8), in Q16 nats.
-    pub consistency_q16_nats: i32,
-    /// The logarithm of the winner's complexity factor (Eq. 9), in Q16 nats.
-    pub complexity_q16_nats: i32,
-    /// How far the winner's weight is ahead of the runner-up's, in Q16 nats; `i32::MAX` without a runner-up.
-    pub lead_q16_nats: i32,
-    /// How many different hypotheses are left after resampling.
+    /// The logarithm of the winner's Eq. 7: how well the observation fits the label its vertex had before.
+    pub ln_label_q16: i32,
+    /// The logarithm of the winner's Eq. 8: how consistent the map is with the evidence.
+    pub ln_consistency_q16: i32,
+    /// The logarithm of the winner's Eq. 9: what the size of the map costs.
+    pub ln_size_q16: i32,
+    /// By how much the logarithm of the winner's weight leads that of the runner-up; 15 nats or more are reported as 15.
+    pub lead_q16: i32,
+    /// How many different hypotheses survived.
     pub distinct_hypotheses: u16,
+}
+
+impl From<&Update> for Evidence {
+    fn from(update: &Update) -> Self {
+        Self {
+            place_index: update.place_index,
+            consistency_mm: update.consistency_mm,
+            ln_label_q16: update.factors.ln_label_q16,
+            ln_consistency_q16: update.factors.ln_consistency_q16,
+            ln_size_q16: update.factors.ln_size_q16,
+            lead_q16: update.lead_q16,
+            distinct_hypotheses: u16::from(update.distinct),
+        }
+    }
 }
 
 /// All that the map says about one vertex.

@@ -4,7 +4,7 @@ use core::fmt;
 
 use super::digest::{map_digest, row_of};
 use super::{Capacities, Evidence, Hello, Location, Message, Row};
-use crate::{FaultCounters, FaultKind, Map};
+use crate::{FaultCounters, FaultKind, Map, Update};
 
 /// Decides what to send. It keeps what the listener was last told and hands each message to a callback, which says
 /// whether the transmit queue took it; it never waits.
@@ -69,17 +69,11 @@ impl<const V: usize> Reporter<V> {
         self.refused
     }
 
-    /// After each place: sends what is new in the map, how large it is, where the robot is and why.
+    /// After each place: sends what is new in the filter's best map, how large it is, where the robot is and why.
     ///
     /// A vertex of which several edges changed goes out as one `Row`, so that a change of the best hypothesis cannot
     /// flood the line: at most 2 `V` + 3 messages. Cost: linear in the number of vertices.
-    pub fn update(
-        &mut self,
-        map: &Map<V>,
-        location: Location,
-        evidence: Evidence,
-        mut send: impl FnMut(&Message) -> Result<(), QueueFull>,
-    ) {
+    pub fn update(&mut self, map: &Map<V>, update: &Update, mut send: impl FnMut(&Message) -> Result<(), QueueFull>) {
         let told_vertices = self.vertices;
         if map.vertices() < told_vertices {
             self.forget_from(map.vertices());
@@ -113,10 +107,11 @@ impl<const V: usize> Reporter<V> {
         if changed {
             self.send_size(map, &mut send);
         }
+        let location = Location::from(update);
         if self.location != Some(location) && self.send(&Message::Location(location), &mut send) {
             self.location = Some(location);
         }
-        self.send(&Message::Evidence(evidence), &mut send);
+        self.send(&Message::Evidence(Evidence::from(update)), &mut send);
     }
 
     /// At a steady pace: sends the faults whose count has changed and the next piece of the rolling picture.
