@@ -40,7 +40,8 @@ impl Encoder {
 
     /// Packs one message into `out` and returns the bytes of the frame, its closing zero included.
     ///
-    /// A buffer of [`MAX_FRAME_BYTES`] is always enough. Cost: linear in the length; 120 bytes of stack or so.
+    /// A buffer of [`MAX_FRAME_BYTES`] is always enough. Cost: linear in the length; the frame
+    /// before stuffing lies on the stack.
     ///
     /// # Errors
     /// [`EncodeError::OutputTooShort`] when the frame does not fit into `out`; no sequence number is used up.

@@ -10,7 +10,7 @@ use crate::map::bits;
 /// The map as heard so far, and whether it is the robot's.
 ///
 /// Any message may be missing, doubled or late: late ones are ignored, and what is missing comes round with the
-/// rolling picture. `V` has to be at least the robot's; 64 always is. Memory: 16 bytes for each vertex and 200 bytes.
+/// rolling picture. `V` has to be at least the robot's; 64 always is. Memory: 16 bytes for each vertex and about 160 bytes.
 #[derive(Clone, Debug)]
 pub struct Picture<const V: usize> {
     vertices: u8,

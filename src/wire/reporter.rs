@@ -11,7 +11,7 @@ use crate::{FaultCounters, FaultKind, Map, Update};
 ///
 /// A message that was refused counts as not sent: the change goes out with the next update or with the rolling
 /// picture, whichever comes first. Messages that are no state (`Place`, `Health`, `Ring`) the caller sends on its own.
-/// Memory: 16 bytes for each vertex and 150 bytes.
+/// Memory: 16 bytes for each vertex and about 100 bytes.
 #[derive(Clone, Debug)]
 pub struct Reporter<const V: usize> {
     hello: Hello,

@@ -2,6 +2,7 @@
 
 use super::samples::{largest, typical};
 use super::{Heard, frame, hear};
+use proptest::prelude::*;
 use toposlam::wire::{Decoder, Encoder, MAX_FRAME_BYTES, Message};
 
 /// A stream of frames, and where each frame ends.
@@ -138,6 +139,22 @@ fn every_kind_of_damage_is_counted_as_what_it_is() {
     assert_eq!((counters.unknown_version, counters.unknown_message), (1, 2));
     assert_eq!((counters.messages, counters.lost), (2, 0), "an unknown message is not a lost one");
     assert_eq!((heard.messages.len(), heard.errors), (2, 6));
+}
+
+proptest! {
+    #[test]
+    fn noise_is_no_message_and_the_frame_after_it_is_heard(noise in proptest::collection::vec(any::<u8>(), 0..600)) {
+        let edge = Message::Edge { a: 1, b: 2, present: true };
+        let stream = [&noise[..], &[0], &frame(&mut Encoder::new(0), &edge)].concat();
+        let messages: Vec<_> = hear(&stream).messages.into_iter().map(|(_, message)| message).collect();
+        prop_assert_eq!(messages, [edge]);
+    }
+
+    #[test]
+    fn an_intact_frame_of_any_payload_is_one_message_or_one_error(payload in proptest::collection::vec(any::<u8>(), 0..103)) {
+        let heard = hear(&with_crc(&[&[1, 0, 0], &payload[..]].concat()));
+        prop_assert_eq!(heard.messages.len() + heard.errors, 1);
+    }
 }
 
 /// A frame of the given header and payload, by another CRC and COBS than the library's.

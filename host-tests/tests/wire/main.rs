@@ -2,6 +2,7 @@
 
 mod convergence;
 mod damage;
+mod robot;
 mod samples;
 mod schema;
 mod specification;
