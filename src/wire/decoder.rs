@@ -78,7 +78,7 @@ pub struct DecoderCounters {
 /// Takes the bytes of the serial line in pieces of any length and hands out the messages.
 ///
 /// It never blocks and never reads beyond the frame that it hands out. Whatever goes wrong inside a frame, the next
-/// zero byte ends it, and the frame after is read as if nothing had happened. Memory: about 170 bytes.
+/// zero byte ends it, and the frame after is read as if nothing had happened. Memory: 160 bytes.
 ///
 /// ```
 /// use toposlam::wire::{Decoder, Encoder, MAX_FRAME_BYTES, Message, Progress};
