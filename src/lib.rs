@@ -23,6 +23,8 @@ mod likelihood;
 mod map;
 mod ngram;
 pub mod ring;
+#[cfg(feature = "wire")]
+pub mod wire;
 
 pub use consistency::{Consistency, Direction, Evidence};
 pub use fault::{FaultCounters, FaultKind};
