@@ -7,10 +7,10 @@ use core::fmt;
 /// The defaults suit a ring of 16 or 24 sonars on a robot that drives some 30 mm between two frames.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct PlaceConfig {
-    /// Obstacles whose ranges differ by no more than this are equidistant, in millimetres. Default 100.
+    /// Obstacles whose ranges differ by no more than this are equidistant, in millimetres. Default 150.
     ///
     /// It must cover the range noise (the spread of three readings is about twice their standard deviation) and a
-    /// few frames of travel.
+    /// few frames of travel and of straying from the middle, which counts twice.
     pub equidistance_mm: u16,
     /// The meet point has been left when the third obstacle is this much farther than the nearest, in millimetres.
     /// Default 300. At least `equidistance_mm`.
@@ -38,7 +38,7 @@ pub struct PlaceConfig {
 impl PlaceConfig {
     /// The documented defaults.
     pub const DEFAULT: Self = Self {
-        equidistance_mm: 100,
+        equidistance_mm: 150,
         leave_mm: 300,
         separation_mrad: 1047,
         confirm_frames: 3,
@@ -146,7 +146,7 @@ mod tests {
         assert_eq!(good.check(16), Ok(()));
         let bad = [
             (PlaceConfig { equidistance_mm: 0, ..good }, PlaceConfigError::EquidistanceMm),
-            (PlaceConfig { leave_mm: 99, ..good }, PlaceConfigError::LeaveMm),
+            (PlaceConfig { leave_mm: 149, ..good }, PlaceConfigError::LeaveMm),
             (PlaceConfig { separation_mrad: 2095, ..good }, PlaceConfigError::SeparationMrad),
             (PlaceConfig { confirm_frames: 0, ..good }, PlaceConfigError::ConfirmFrames),
             (PlaceConfig { leave_frames: 0, ..good }, PlaceConfigError::LeaveFrames),

@@ -8,7 +8,7 @@ pub(super) const DEAD: u16 = 0;
 pub(super) const SILENT: u16 = u16::MAX;
 /// At most this many obstacles are looked at: with 60° between them no more fit.
 const CAPACITY: usize = 6;
-const FULL_TURN_MRAD: u16 = 6283;
+const HALF_TURN_MRAD: i32 = 3142;
 
 /// What the closest obstacles say about a meet point.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -21,10 +21,40 @@ pub(super) struct Meeting {
     pub(super) openings: u8,
 }
 
-/// The angle between two bearings, 0 to half a turn, in milliradians.
-fn angle_mrad(one_mrad: i16, other_mrad: i16) -> u16 {
-    let apart = one_mrad.abs_diff(other_mrad);
-    apart.min(FULL_TURN_MRAD.saturating_sub(apart))
+/// The turn from one bearing to another the short way round, counter-clockwise positive, in milliradians.
+fn turn_mrad(from_mrad: i16, to_mrad: i16) -> i32 {
+    let turn_mrad = i32::from(to_mrad) - i32::from(from_mrad);
+    if turn_mrad > HALF_TURN_MRAD {
+        turn_mrad - 2 * HALF_TURN_MRAD
+    } else if turn_mrad < -HALF_TURN_MRAD {
+        turn_mrad + 2 * HALF_TURN_MRAD
+    } else {
+        turn_mrad
+    }
+}
+
+/// The middle of the obstacle that one echo belongs to: of the live sensors within half the separation that hear it
+/// about as near. Which of them hears it nearest is chance.
+fn middle_mrad<const SONARS: usize>(
+    (range_mm, bearing_mrad): (u16, i16),
+    ranges_mm: &[u16; SONARS],
+    geometry: &RingGeometry<SONARS>,
+    separation_mrad: u16,
+    equidistance_mm: u16,
+) -> i16 {
+    let limit_mm = range_mm.saturating_add(equidistance_mm);
+    let mut count = 0i32;
+    let mut sum_mrad = 0i32;
+    for (&other_mm, &other_mrad) in ranges_mm.iter().zip(&geometry.bearings_mrad) {
+        let turn_mrad = turn_mrad(bearing_mrad, other_mrad);
+        let near = turn_mrad.abs().saturating_mul(2) <= i32::from(separation_mrad);
+        if near && other_mm != DEAD && other_mm != SILENT && other_mm <= limit_mm {
+            count = count.saturating_add(1);
+            sum_mrad = sum_mrad.saturating_add(turn_mrad);
+        }
+    }
+    let middle_mrad = i32::from(bearing_mrad).saturating_add(sum_mrad.checked_div(count).unwrap_or(0));
+    turn_mrad(0, middle_mrad as i16) as i16
 }
 
 /// Finds the closest obstacles: the nearest range first, then the nearest at least `separation_mrad` from all before.
@@ -53,6 +83,8 @@ pub(super) fn meeting<const SONARS: usize>(
         if number == 2 {
             third_mm = range_mm;
         }
+        let echo = (range_mm, bearing_mrad);
+        let bearing_mrad = middle_mrad(echo, ranges_mm, geometry, separation_mrad, equidistance_mm);
         if range_mm.saturating_sub(nearest_mm) <= equidistance_mm {
             *slot = bearing_mrad;
             equidistant_count = equidistant_count.saturating_add(1);
@@ -61,7 +93,7 @@ pub(super) fn meeting<const SONARS: usize>(
             break;
         }
         for (candidate, &other_mrad) in candidate.iter_mut().zip(bearings) {
-            *candidate &= angle_mrad(bearing_mrad, other_mrad) >= separation_mrad;
+            *candidate &= turn_mrad(bearing_mrad, other_mrad).abs() >= i32::from(separation_mrad);
         }
     }
     let radius_mm = sum_mm.checked_div(equidistant_count).unwrap_or(0) as u16;
@@ -99,10 +131,19 @@ mod tests {
     }
 
     #[test]
-    fn the_angle_between_bearings_goes_the_short_way_round() {
-        assert_eq!(angle_mrad(3142, -3142), 0);
-        assert_eq!(angle_mrad(3000, -3000), 283);
-        assert_eq!(angle_mrad(-785, 785), 1570);
+    fn the_turn_between_bearings_goes_the_short_way_round() {
+        assert_eq!(turn_mrad(3142, -3142), 0);
+        assert_eq!(turn_mrad(3000, -3000), 284);
+        assert_eq!(turn_mrad(-3000, 3000), -284);
+        assert_eq!(turn_mrad(-785, 785), 1570);
+    }
+
+    #[test]
+    fn an_obstacle_lies_in_the_middle_of_the_sensors_that_hear_it() {
+        let ranges = [SILENT, SILENT, SILENT, 1020, 1000, 1020, SILENT, SILENT];
+        assert_eq!(middle_mrad((1000, 3142), &ranges, &even_ring(), 1600, 100), 3142);
+        let one_sided = [SILENT, SILENT, SILENT, SILENT, 1010, 1000, SILENT, SILENT];
+        assert_eq!(middle_mrad((1000, -2356), &one_sided, &even_ring(), 1600, 100), -2749);
     }
 
     #[test]

@@ -51,17 +51,6 @@ impl Default for SonarModel {
     }
 }
 
-impl SonarModel {
-    /// The same sonars with range noise and missed echoes multiplied.
-    pub fn with_noise(self, factor: f64) -> Self {
-        Self {
-            range_sd_mm: self.range_sd_mm * factor,
-            missed_share: (self.missed_share * factor).clamp(0.0, 1.0),
-            ..self
-        }
-    }
-}
-
 /// The simulated ring: 16 sonars 22.5° apart, counter-clockwise, the first straight ahead.
 pub fn even_ring() -> RingGeometry<SONARS> {
     let mut geometry = RingGeometry { bearings_mrad: [0; SONARS] };

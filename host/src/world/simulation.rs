@@ -3,6 +3,7 @@
 use std::f64::consts::PI;
 
 use rand::{RngExt, SeedableRng};
+use rand_distr::{Distribution, StandardNormal};
 use rand_xoshiro::Xoshiro256PlusPlus;
 use toposlam::ring::RingFrame;
 
@@ -47,6 +48,12 @@ pub struct RobotModel {
     pub turn_rad_per_s: f64,
     /// How often the robot turns back at a node that leads on, 0 to 1. Default 0.1. At dead ends it always does.
     pub u_turn_share: f64,
+    /// Standard deviation of the way driven from the Voronoi graph, sideways, in millimetres. Default 20.
+    pub track_sd_mm: f64,
+    /// Standard deviation of the heading from the way's direction, in radians. Default 0.03.
+    pub heading_sd_rad: f64,
+    /// How long the two deviations last, in seconds. Default 1.
+    pub deviation_s: f64,
     /// Its sonars.
     pub sonar: SonarModel,
 }
@@ -58,8 +65,41 @@ impl Default for RobotModel {
             frames_per_s: 10.0,
             turn_rad_per_s: PI / 2.0,
             u_turn_share: 0.1,
+            track_sd_mm: 20.0,
+            heading_sd_rad: 0.03,
+            deviation_s: 1.0,
             sonar: SonarModel::default(),
         }
+    }
+}
+
+impl RobotModel {
+    /// The same robot with every noise multiplied: range noise, missed echoes, and deviation from the way.
+    pub fn with_noise(self, factor: f64) -> Self {
+        let sonar = SonarModel {
+            range_sd_mm: self.sonar.range_sd_mm * factor,
+            missed_share: (self.sonar.missed_share * factor).clamp(0.0, 1.0),
+            ..self.sonar
+        };
+        Self {
+            track_sd_mm: self.track_sd_mm * factor,
+            heading_sd_rad: self.heading_sd_rad * factor,
+            sonar,
+            ..self
+        }
+    }
+}
+
+/// A deviation of standard deviation 1 that fades slowly into the next one.
+struct Drift(f64);
+
+impl Drift {
+    /// The deviation a time step later, for a step of this share of the time that deviations last.
+    fn step(&mut self, share: f64, random: &mut Xoshiro256PlusPlus) -> f64 {
+        let kept = (-share).exp();
+        let fresh: f64 = StandardNormal.sample(random);
+        self.0 = kept * self.0 + (1.0 - kept * kept).sqrt() * fresh;
+        self.0
     }
 }
 
@@ -82,6 +122,8 @@ pub struct Simulation {
     driven_mm: f64,
     heading_rad: f64,
     at_node: Option<usize>,
+    sideways: Drift,
+    askew: Drift,
 }
 
 impl Simulation {
@@ -115,6 +157,8 @@ impl Simulation {
             driven_mm,
             map,
             at_node: None,
+            sideways: Drift(0.0),
+            askew: Drift(0.0),
         })
     }
 
@@ -123,11 +167,16 @@ impl Simulation {
         &self.map
     }
 
-    /// Where the robot is now.
-    fn pose(&self) -> Pose {
+    /// Where the robot is now: beside its way and a little askew.
+    fn pose(&mut self) -> Pose {
         let ends = &self.way[self.leg..self.leg + 2];
-        let position = ends[0].towards(ends[1], self.driven_mm / ends[0].distance_mm(ends[1]));
-        Pose { position, heading_rad: self.heading_rad }
+        let on_way = ends[0].towards(ends[1], self.driven_mm / ends[0].distance_mm(ends[1]));
+        let share = 1.0 / (self.model.frames_per_s * self.model.deviation_s);
+        let sideways_mm = self.model.track_sd_mm * self.sideways.step(share, &mut self.random);
+        let askew_rad = self.model.heading_sd_rad * self.askew.step(share, &mut self.random);
+        let (sine, cosine) = self.heading_rad.sin_cos();
+        let position = Point::new(on_way.x_mm - sine * sideways_mm, on_way.y_mm + cosine * sideways_mm);
+        Pose { position, heading_rad: wrapped(self.heading_rad + askew_rad) }
     }
 
     /// Moves the robot on by the time between two frames.
@@ -222,7 +271,7 @@ mod tests {
     fn the_robot_keeps_its_speed_and_stays_off_the_walls() {
         let plan = Plan::built_in("flat").unwrap();
         let truths: Vec<Truth> =
-            Simulation::new(&plan, RobotModel::default(), 3).unwrap().map(|(_, truth)| truth).take(1500).collect();
+            Simulation::new(&plan, RobotModel::default().with_noise(0.0), 3).unwrap().map(|(_, truth)| truth).take(1500).collect();
         for pair in truths.windows(2) {
             let moved_mm = pair[0].pose.position.distance_mm(pair[1].pose.position);
             assert!(moved_mm < 30.1, "{pair:?}");
@@ -234,7 +283,7 @@ mod tests {
     #[test]
     fn the_robot_is_at_the_node_it_names() {
         let plan = Plan::built_in("office").unwrap();
-        let mut simulation = Simulation::new(&plan, RobotModel::default(), 4).unwrap();
+        let mut simulation = Simulation::new(&plan, RobotModel::default().with_noise(0.0), 4).unwrap();
         let map = simulation.true_map().clone();
         for (_, truth) in simulation.by_ref().take(1500) {
             if let Some(node) = truth.node {
