@@ -27,8 +27,8 @@ mod voronoi;
 
 pub use journal::{Detection, Journal, Report};
 pub use plan::{Plan, PlanError};
-pub use simulation::{Pose, RobotModel, Simulation, Truth};
 pub use sight::{SONARS, SonarModel, even_ring};
+pub use simulation::{Pose, RobotModel, Simulation, Truth};
 pub use voronoi::{TrueEdge, TrueMap, TrueNode, VoronoiError};
 
 /// A point of the floor plan, in millimetres from its lower left corner; x to the right, y up.

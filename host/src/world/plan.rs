@@ -159,8 +159,7 @@ impl Plan {
     pub(super) fn faces(&self) -> Vec<Face> {
         let (columns, rows) = (self.columns as i32, self.rows() as i32);
         let along_x = runs(rows, columns, |row, column| (self.is_wall(column, row - 1), self.is_wall(column, row)));
-        let along_y =
-            runs(columns, rows, |column, row| (self.is_wall(column - 1, row), self.is_wall(column, row)));
+        let along_y = runs(columns, rows, |column, row| (self.is_wall(column - 1, row), self.is_wall(column, row)));
         let cell_mm = i32::from(self.cell_mm);
         let scaled = |from: (i32, i32), to: (i32, i32)| Face {
             from: (from.0 * cell_mm, from.1 * cell_mm),

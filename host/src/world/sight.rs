@@ -124,9 +124,8 @@ impl Scene {
             for (sonar, heard_mm) in heard_mm.iter_mut().enumerate() {
                 let axis = pose.heading_rad + TAU * sonar as f64 / SONARS as f64;
                 if range_mm < *heard_mm && wrapped(direction - axis).abs() <= model.cone_half_angle_rad {
-                    let seen = *in_sight.get_or_insert_with(|| {
-                        self.cast(pose.position, direction, range_mm).0 >= range_mm - 1.0
-                    });
+                    let seen = *in_sight
+                        .get_or_insert_with(|| self.cast(pose.position, direction, range_mm).0 >= range_mm - 1.0);
                     if seen {
                         *heard_mm = range_mm;
                     }
@@ -145,7 +144,11 @@ impl Scene {
         let axis = |cell: i32, start_mm: f64, slope: f64| {
             let line = if slope > 0.0 { cell + 1 } else { cell };
             let to_line = (f64::from(line) * cell_mm - start_mm) / slope;
-            (if slope > 0.0 { 1 } else { -1 }, (cell_mm / slope).abs(), if slope == 0.0 { f64::INFINITY } else { to_line })
+            (
+                if slope > 0.0 { 1 } else { -1 },
+                (cell_mm / slope).abs(),
+                if slope == 0.0 { f64::INFINITY } else { to_line },
+            )
         };
         let (step_x, between_x, mut to_x) = axis(column, from.x_mm, cosine);
         let (step_y, between_y, mut to_y) = axis(row, from.y_mm, sine);

@@ -81,12 +81,7 @@ impl RobotModel {
             missed_share: (self.sonar.missed_share * factor).clamp(0.0, 1.0),
             ..self.sonar
         };
-        Self {
-            track_sd_mm: self.track_sd_mm * factor,
-            heading_sd_rad: self.heading_sd_rad * factor,
-            sonar,
-            ..self
-        }
+        Self { track_sd_mm: self.track_sd_mm * factor, heading_sd_rad: self.heading_sd_rad * factor, sonar, ..self }
     }
 }
 
@@ -140,7 +135,8 @@ impl Simulation {
             let ends = &map.edges[edge].way[leg..leg + 2];
             ends[0].towards(ends[1], driven_mm / ends[0].distance_mm(ends[1])).distance_mm(plan.start())
         };
-        let nearest = legs.min_by(|one, other| gap_mm(one.0, one.1, one.2).total_cmp(&gap_mm(other.0, other.1, other.2)));
+        let nearest =
+            legs.min_by(|one, other| gap_mm(one.0, one.1, one.2).total_cmp(&gap_mm(other.0, other.1, other.2)));
         let (edge, leg, driven_mm) = nearest.ok_or(VoronoiError::NoPlace)?;
         let way = map.edges[edge].way.clone();
         Ok(Self {
@@ -223,13 +219,14 @@ impl Simulation {
         // Each edge from each of its ends that is here: a loop can be driven both ways.
         let mut ways: Vec<(usize, bool)> = Vec::new();
         for (index, edge) in self.map.edges.iter().enumerate() {
-            ways.extend(edge.nodes.iter().zip([false, true]).filter(|(node, _)| **node == here).map(|(_, r)| (index, r)));
+            ways.extend(
+                edge.nodes.iter().zip([false, true]).filter(|(node, _)| **node == here).map(|(_, r)| (index, r)),
+            );
         }
         let u_turn = (self.edge, !self.reversed);
         let onward: Vec<_> = ways.iter().copied().filter(|way| *way != u_turn).collect();
         let turn_back = onward.is_empty() || self.random.random_bool(self.model.u_turn_share);
-        let (edge, reversed) =
-            if turn_back { u_turn } else { onward[self.random.random_range(0..onward.len())] };
+        let (edge, reversed) = if turn_back { u_turn } else { onward[self.random.random_range(0..onward.len())] };
         let TrueEdge { nodes, way } = &self.map.edges[edge];
         self.way = if reversed { way.iter().rev().copied().collect() } else { way.clone() };
         self.target = nodes[usize::from(!reversed)];
@@ -239,7 +236,6 @@ impl Simulation {
         self.driven_mm = 0.0;
     }
 }
-
 
 /// How far along a leg the point nearest to another lies, in millimetres.
 fn along(ends: &[Point], point: Point) -> f64 {
@@ -270,8 +266,11 @@ mod tests {
     #[test]
     fn the_robot_keeps_its_speed_and_stays_off_the_walls() {
         let plan = Plan::built_in("flat").unwrap();
-        let truths: Vec<Truth> =
-            Simulation::new(&plan, RobotModel::default().with_noise(0.0), 3).unwrap().map(|(_, truth)| truth).take(1500).collect();
+        let truths: Vec<Truth> = Simulation::new(&plan, RobotModel::default().with_noise(0.0), 3)
+            .unwrap()
+            .map(|(_, truth)| truth)
+            .take(1500)
+            .collect();
         for pair in truths.windows(2) {
             let moved_mm = pair[0].pose.position.distance_mm(pair[1].pose.position);
             assert!(moved_mm < 30.1, "{pair:?}");

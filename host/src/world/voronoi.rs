@@ -277,7 +277,8 @@ mod tests {
 
     #[test]
     fn a_corridor_has_a_dead_end_at_each_end() {
-        let map = TrueMap::of(&plan(&["..............", ".S............", "..............", ".............."])).unwrap();
+        let map =
+            TrueMap::of(&plan(&["..............", ".S............", "..............", ".............."])).unwrap();
         assert_eq!((map.nodes.len(), map.edges.len()), (2, 1));
         for node in &map.nodes {
             assert!((node.radius_mm - 1000.0).abs() < 1.0, "{node:?}");
