@@ -22,6 +22,7 @@ mod history;
 mod likelihood;
 mod map;
 mod ngram;
+pub mod place;
 pub mod ring;
 #[cfg(feature = "wire")]
 pub mod wire;
