@@ -17,6 +17,7 @@
 mod fault;
 mod fingerprint;
 pub mod ring;
+pub mod sonar;
 
 pub use fault::{FaultCounters, FaultKind};
 pub use fingerprint::{Fingerprint, FingerprintError};
