@@ -13,6 +13,8 @@ impl Fingerprint {
     pub const STEP_MM: u16 = 2;
     /// How many bits a fingerprint needs.
     pub const BITS: u32 = 12;
+    /// The smallest fingerprint: no room at all.
+    pub const ZERO: Self = Self(0);
     /// The largest fingerprint: 4094 steps, 8188 mm.
     pub const MAX: Self = Self(4094);
 
