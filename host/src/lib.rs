@@ -1,1 +1,4 @@
 //! Laptop side.
+
+pub mod chip;
+pub mod emulator;
