@@ -51,7 +51,7 @@ impl Emulation {
         Self {
             qemu: "qemu-system-arm".into(),
             elf: elf.into(),
-            ranging_polls: 1,
+            ranging_polls: 0,
             timeout: Duration::from_secs(600),
             quiet: Duration::from_millis(500),
         }

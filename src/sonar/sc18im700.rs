@@ -44,9 +44,10 @@ const CRYSTAL_HZ: u32 = 7_372_800;
 
 /// An SC18IM700 on a UART, as an I2C bus with 7-bit addresses.
 ///
-/// After each message the driver asks for the bus status, followed by two registers of known content. A message that
-/// fails while reading may or may not be padded with data; the markers tell the two apart without waiting for silence.
-/// (A read that succeeds and begins with a failure code followed by both markers, 0xF1 0x26 0x67, is taken for a failure.)
+/// After each message the driver asks for the bus status. The status of a failed read comes without data before it and
+/// may be mistaken for data, so when the first byte could be either, the driver asks for two registers of known content
+/// and sees where they come, instead of waiting for silence. (A read that succeeds and begins with a failure code followed
+/// by both, say 0xF1 0x26 0x67, is taken for a failure.)
 ///
 /// Each byte is waited for with a budget of polls, so no call lasts longer than its bytes times the budget. A message has
 /// at most 16 bytes to write and 16 to read; adjacent operations of the same kind count as one, as `embedded-hal` wants it.
@@ -170,25 +171,30 @@ impl<UART: Read<u8> + Write<u8>> Sc18im700<UART> {
             previous = Some(reads);
             rest = behind;
         }
-        self.send(&[STOP, READ_REGISTER, BUS_STATUS, OWN_ADDRESS, BUS_TIMEOUT, STOP])
+        self.send(&[STOP, READ_REGISTER, BUS_STATUS, STOP])
     }
 
+    /// The data of a message that went well.
     fn receive_reply(&mut self, data_bytes: usize) -> Result<Vec<u8, REPLY_BYTES>, BridgeError> {
         let mut reply: Vec<u8, REPLY_BYTES> = Vec::new();
-        for _ in 0..data_bytes.saturating_add(3) {
+        let mut expected = data_bytes.saturating_add(1);
+        while reply.len() < expected {
             let byte = self.receive()?;
             reply.push(byte).map_err(|_| BridgeError::TooLong)?;
-            if let &[status, OWN_ADDRESS_MARKER, BUS_TIMEOUT_MARKER] = reply.as_slice() {
-                if data_bytes == 0 || is_failure(status) {
+            match *reply.as_slice() {
+                // Either data or the status of a read that gave none: ask for two bytes that are known.
+                [first] if data_bytes > 0 && is_failure(first) => {
+                    self.send(&[READ_REGISTER, OWN_ADDRESS, BUS_TIMEOUT, STOP])?;
+                    expected = expected.saturating_add(2);
+                }
+                [status, OWN_ADDRESS_MARKER, BUS_TIMEOUT_MARKER] if is_failure(status) => {
                     return verdict(status).map(|()| reply);
                 }
+                _ => {}
             }
         }
-        let mut tail = reply.iter().rev();
-        match (tail.next(), tail.next(), tail.next()) {
-            (Some(&BUS_TIMEOUT_MARKER), Some(&OWN_ADDRESS_MARKER), Some(&status)) => verdict(status).map(|()| reply),
-            _ => Err(BridgeError::OutOfStep),
-        }
+        let status = reply.iter().nth(data_bytes).copied();
+        status.ok_or(BridgeError::OutOfStep).and_then(verdict).map(|()| reply)
     }
 }
 
