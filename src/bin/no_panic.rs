@@ -1,19 +1,48 @@
-//! The robot image: wires a board to the stages.
+//! The proof that no panic path is left in the library: this image links only when there is none.
+//!
+//! It calls every public function of the library with inputs that the optimiser cannot see through. Its panic handler
+//! calls a function that does not exist, so a panic path that survives the optimiser is an undefined symbol. Build it with
+//! `cargo firmware --profile proof --bin no_panic`; it is never run. `--cfg teeth` adds one function that can panic, to show
+//! that the proof can fail.
 #![no_std]
 #![no_main]
-use cortex_m as _;
-use cortex_m_semihosting as _;
+
+use core::{hint::black_box, panic::PanicInfo};
+
 use defmt_rtt as _;
-use static_cell as _;
 use stm32f4xx_hal as _;
-use toposlam as _;
+
+mod proof;
 
 #[panic_handler]
-fn panic(_: &core::panic::PanicInfo) -> ! {
-    loop {}
+fn panic(_: &PanicInfo<'_>) -> ! {
+    #[allow(unsafe_code)]
+    unsafe extern "C" {
+        fn a_panic_path_survived() -> !;
+    }
+    // SAFETY: never executed; the image does not link when this is reachable.
+    #[allow(unsafe_code)]
+    unsafe {
+        a_panic_path_survived()
+    }
+}
+
+#[cfg(teeth)]
+fn can_panic(numbers: &[u32]) -> u32 {
+    numbers[black_box(7)]
 }
 
 #[cortex_m_rt::entry]
 fn main() -> ! {
-    loop {}
+    proof::fault();
+    proof::ring();
+    proof::sonar();
+    proof::fingerprint_and_ngram();
+    proof::map_and_history();
+    proof::filter();
+    #[cfg(teeth)]
+    black_box(can_panic(black_box(&[1, 2, 3])));
+    loop {
+        black_box(0);
+    }
 }
