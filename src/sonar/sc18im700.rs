@@ -242,7 +242,8 @@ impl<UART: Read<u8> + Write<u8>> I2c for Sc18im700<UART> {
         }
         self.discard_stale();
         self.send_message(address, operations)?;
-        let mut data = self.receive_reply(data_bytes)?.into_iter();
+        let reply = self.receive_reply(data_bytes)?;
+        let mut data = reply.iter().copied();
         for operation in operations {
             if let Operation::Read(bytes) = operation {
                 for (byte, received) in bytes.iter_mut().zip(&mut data) {

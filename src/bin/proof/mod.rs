@@ -117,7 +117,7 @@ pub(crate) fn sonar() {
     report(bridge.start());
     report(bridge.set_baud_rate(black_box(9600)));
     static READ: ConstStaticCell<[u8; 40]> = ConstStaticCell::new([0; 40]);
-    if let Some(read) = READ.take().get_mut(..black_box(3)) {
+    if let Some(read) = READ.try_take().and_then(|read| read.get_mut(..black_box(3))) {
         report(bridge.read(black_box(1), read));
         report(bridge.write_read(black_box(1), black_box(&[1, 2, 3]), read));
         let written = black_box([5; 20]);
@@ -186,13 +186,12 @@ pub(crate) fn fingerprint_and_ngram() {
 fn table(length: NgramLength, ngram: Ngram) {
     static TABLE: ConstStaticCell<NgramTable<WORDS>> = ConstStaticCell::new(NgramTable::new(NgramLength::MIN));
     static HISTORY: ConstStaticCell<History<WORDS>> = ConstStaticCell::new(History::new());
-    let table = TABLE.take();
+    let (Some(table), Some(history)) = (TABLE.try_take(), HISTORY.try_take()) else { return };
     *table = black_box(NgramTable::new(length));
     black_box((table.len(), table.is_empty(), table.length()));
     if let Err(error) = table.insert(ngram) {
         show::<NgramsFull>(error);
     }
-    let history = HISTORY.take();
     for _ in 0..black_box(3) {
         black_box(history.push(any_fingerprint()));
     }
@@ -202,7 +201,7 @@ fn table(length: NgramLength, ngram: Ngram) {
     black_box(table.ngrams());
     static MAP: ConstStaticCell<Map<VERTICES>> = ConstStaticCell::new(Map::new());
     static CONSISTENCY: ConstStaticCell<Consistency<VERTICES, WORDS, 1>> = ConstStaticCell::new(Consistency::new());
-    let (map, consistency) = (MAP.take(), CONSISTENCY.take());
+    let (Some(map), Some(consistency)) = (MAP.try_take(), CONSISTENCY.try_take()) else { return };
     for direction in [Direction::TwoSided, Direction::MapToHistory, Direction::HistoryToMap].opaque() {
         black_box(consistency.distance_steps(map, &*history, length, direction));
         black_box(consistency.distance_steps(map, &*table, length, direction));
@@ -212,7 +211,7 @@ fn table(length: NgramLength, ngram: Ngram) {
 
 pub(crate) fn map_and_history() {
     static MAP: ConstStaticCell<Map<VERTICES>> = ConstStaticCell::new(Map::new());
-    let map = MAP.take();
+    let Some(map) = MAP.try_take() else { return };
     for _ in 0..black_box(3) {
         if let Err(error) = map.add_vertex(any_fingerprint()) {
             show::<VerticesFull>(error);
@@ -227,7 +226,7 @@ pub(crate) fn map_and_history() {
     }
     map.clear();
     static HISTORY: ConstStaticCell<History<WORDS>> = ConstStaticCell::new(History::new());
-    let history = HISTORY.take();
+    let Some(history) = HISTORY.try_take() else { return };
     for _ in 0..black_box(3) {
         black_box(history.push(any_fingerprint()));
     }
@@ -241,8 +240,8 @@ pub(crate) fn map_and_history() {
 pub(crate) fn filter() {
     static FILTER: ConstStaticCell<PaperFilter<PARTICLES, VERTICES, WORDS>> = ConstStaticCell::new(PaperFilter::new());
     static PRIOR: ConstStaticCell<Prior<VERTICES, WORDS>> = ConstStaticCell::new(Prior::new(NgramLength::MIN));
-    let filter = FILTER.take();
-    let prior = PRIOR.take();
+    let Some(filter) = FILTER.try_take() else { return };
+    let Some(prior) = PRIOR.try_take() else { return };
     if let Err(error) = filter.start(Config::default().opaque(), black_box(1)) {
         show::<ConfigError>(error);
     }
