@@ -41,7 +41,10 @@ pub struct Emulation {
     pub ranging_polls: u32,
     /// The whole run is given up after this long.
     pub timeout: Duration,
-    /// After the last frame the run ends when USART1 has been quiet for this long.
+    /// How many frames without any sensor follow the last frame of the world, so that the firmware can repeat what it
+    /// has to say; then the sensor bus falls silent.
+    pub blind_frames: u64,
+    /// After that the run ends when USART1 has been quiet for this long.
     pub quiet: Duration,
 }
 
@@ -53,6 +56,7 @@ impl Emulation {
             elf: elf.into(),
             ranging_polls: 0,
             timeout: Duration::from_secs(600),
+            blind_frames: 64,
             quiet: Duration::from_millis(500),
         }
     }
@@ -82,7 +86,7 @@ impl Emulation {
         let progress = Arc::new(Progress::default());
         let ending = thread::scope(|scope| {
             let stop = usart2.try_clone()?;
-            let bus = scope.spawn(|| play_bus(usart2, Srf08Bank::new(frames, self.ranging_polls), &progress));
+            let bus = scope.spawn(|| self.play_bus(usart2, frames, &progress));
             let ending = self.listen_until_the_end(&mut machine, &mut usart1, &progress, deadline, &mut received);
             // Closing the line ends the thread that waits on it.
             let _ = stop.shutdown(std::net::Shutdown::Both);
@@ -104,6 +108,31 @@ impl Emulation {
                 stack_high_water_bytes,
                 seconds: started.elapsed().as_secs_f64(),
             }),
+        }
+    }
+
+    /// Answers the firmware's bytes on USART2 as the bridge and the rangers behind it would, until the line closes.
+    fn play_bus(
+        &self,
+        mut line: TcpStream,
+        frames: impl FnMut() -> Option<RingFrame<16>>,
+        progress: &Progress,
+    ) -> io::Result<()> {
+        let mut chip = Sc18im700::new(Srf08Bank::new(frames, self.ranging_polls));
+        let mut buffer = [0; BUFFER_BYTES];
+        loop {
+            let count = line.read(&mut buffer)?;
+            if count == 0 {
+                return Ok(());
+            }
+            let answer: Vec<u8> = buffer[..count].iter().flat_map(|&byte| chip.byte(byte)).collect();
+            progress.bus_bytes.fetch_add(count as u64, Ordering::Relaxed);
+            progress.frames.store(chip.devices.frames(), Ordering::Relaxed);
+            if chip.devices.blind_frames() > self.blind_frames {
+                progress.world_over.store(true, Ordering::Release);
+            } else if !answer.is_empty() {
+                line.write_all(&answer)?;
+            }
         }
     }
 
@@ -265,30 +294,6 @@ fn listen() -> anyhow::Result<TcpListener> {
 
 fn is_timeout(error: &io::Error) -> bool {
     matches!(error.kind(), io::ErrorKind::WouldBlock | io::ErrorKind::TimedOut | io::ErrorKind::Interrupted)
-}
-
-/// Answers the firmware's bytes on USART2 as the bridge and the rangers behind it would, until the line closes.
-fn play_bus<WORLD>(mut line: TcpStream, bank: Srf08Bank<WORLD>, progress: &Progress) -> io::Result<()>
-where
-    WORLD: FnMut() -> Option<RingFrame<16>>,
-{
-    let mut chip = Sc18im700::new(bank);
-    let mut buffer = [0; BUFFER_BYTES];
-    loop {
-        let count = line.read(&mut buffer)?;
-        if count == 0 {
-            return Ok(());
-        }
-        let answer: Vec<u8> = buffer[..count].iter().flat_map(|&byte| chip.byte(byte)).collect();
-        progress.bus_bytes.fetch_add(count as u64, Ordering::Relaxed);
-        progress.frames.store(chip.devices.frames(), Ordering::Relaxed);
-        if chip.devices.is_over() {
-            progress.world_over.store(true, Ordering::Release);
-        }
-        if !answer.is_empty() {
-            line.write_all(&answer)?;
-        }
-    }
 }
 
 /// Reads the machine's RAM through QEMU's monitor and finds how deep the stack ever was.

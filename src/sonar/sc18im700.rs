@@ -193,7 +193,7 @@ impl<UART: Read<u8> + Write<u8>> Sc18im700<UART> {
                 _ => {}
             }
         }
-        let status = reply.iter().nth(data_bytes).copied();
+        let status = reply.get(data_bytes).copied();
         status.ok_or(BridgeError::OutOfStep).and_then(verdict).map(|()| reply)
     }
 }

@@ -34,6 +34,7 @@ pub struct Srf08Bank<WORLD> {
     ranging_polls: u32,
     frame: Option<RingFrame<SENSORS>>,
     frames: u64,
+    blind_frames: u64,
     fired: u16,
     sensors: [Sensor; SENSORS],
 }
@@ -50,7 +51,15 @@ struct Sensor {
 impl<WORLD: FnMut() -> Option<RingFrame<SENSORS>>> Srf08Bank<WORLD> {
     /// Rangers in a world. `ranging_polls` stands for the 65 ms of a ranging: so often a sensor reads as still ranging.
     pub fn new(world: WORLD, ranging_polls: u32) -> Self {
-        Self { world, ranging_polls, frame: None, frames: 0, fired: u16::MAX, sensors: [Sensor::default(); SENSORS] }
+        Self {
+            world,
+            ranging_polls,
+            frame: None,
+            frames: 0,
+            blind_frames: 0,
+            fired: u16::MAX,
+            sensors: [Sensor::default(); SENSORS],
+        }
     }
 
     /// Gives a sensor a defect, or heals it.
@@ -63,16 +72,23 @@ impl<WORLD: FnMut() -> Option<RingFrame<SENSORS>>> Srf08Bank<WORLD> {
         self.frames
     }
 
-    /// Whether the world has no more frames; every sensor is absent from then on.
-    pub fn is_over(&self) -> bool {
-        self.frames > 0 && self.frame.is_none()
+    /// How often the ring was fired after the world had no more frames; every sensor is absent then.
+    pub fn blind_frames(&self) -> u64 {
+        self.blind_frames
+    }
+
+    fn is_over(&self) -> bool {
+        self.blind_frames > 0
     }
 
     fn fire(&mut self, which: u16) {
         if self.fired & which != 0 {
             self.fired = 0;
             self.frame = (self.world)();
-            self.frames += u64::from(self.frame.is_some());
+            match self.frame {
+                Some(_) => self.frames += 1,
+                None => self.blind_frames += 1,
+            }
         }
         self.fired |= which;
         for (index, sensor) in self.sensors.iter_mut().enumerate().filter(|(index, _)| which >> index & 1 == 1) {
