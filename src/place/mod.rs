@@ -43,13 +43,14 @@ pub struct Place {
 }
 
 /// A frame that shows a meet point.
-#[derive(Clone, Copy)]
+#[derive(Clone, Copy, Debug)]
 struct Sighting {
     meeting: Meeting,
     frame_index: u32,
 }
 
 impl Sighting {
+    const UNSET: Self = Self { meeting: Meeting { spread_mm: 0, radius_mm: 0, openings: 0 }, frame_index: 0 };
     /// Sorts behind every real sighting.
     const NONE: Self = Self { meeting: Meeting { spread_mm: SILENT, radius_mm: 0, openings: 0 }, frame_index: 0 };
 }
@@ -58,6 +59,7 @@ impl Sighting {
 ///
 /// The ranges are taken from the robot's centre; add the radius of the ring if the sensors measure from its rim.
 /// Memory: about `6 · SONARS + 150` bytes. Time for each frame: `O(SONARS)`, at most six passes over the ring.
+#[derive(Clone, Debug)]
 pub struct PlaceDetector<const SONARS: usize> {
     config: PlaceConfig,
     geometry: RingGeometry<SONARS>,
@@ -77,10 +79,10 @@ pub struct PlaceDetector<const SONARS: usize> {
 }
 
 impl<const SONARS: usize> PlaceDetector<SONARS> {
-    /// A detector that waits for [`start`](Self::start).
+    /// A detector that waits for [`start`](Self::start); all zero, so that a `static` of it lies in `.bss`.
     pub const fn new() -> Self {
         Self {
-            config: PlaceConfig::DEFAULT,
+            config: PlaceConfig::UNSET,
             geometry: RingGeometry { bearings_mrad: [0; SONARS] },
             started: false,
             earlier_mm: [[DEAD; SONARS]; 2],
@@ -88,7 +90,7 @@ impl<const SONARS: usize> PlaceDetector<SONARS> {
             leaving: false,
             sighted: 0,
             against: 0,
-            kept: [Sighting::NONE; KEPT],
+            kept: [Sighting::UNSET; KEPT],
             faults: FaultCounters::new(),
         }
     }
