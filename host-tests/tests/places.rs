@@ -4,8 +4,10 @@ use std::fs::File;
 use std::io::Write;
 use std::path::Path;
 
+use proptest::prelude::*;
 use toposlam::FaultKind;
 use toposlam::place::{Place, PlaceConfig, PlaceDetector};
+use toposlam::ring::{Echo, RingFrame};
 use toposlam_host::recording::Ring;
 use toposlam_host::world::{Journal, Plan, Report, RobotModel, SONARS, Simulation, SonarModel, even_ring};
 
@@ -94,4 +96,41 @@ fn the_real_recording_gives_places_whose_radius_fits_its_room() {
     assert!((6..=30).contains(&places.len()), "{places:?}");
     assert!(places.iter().all(|place| (300..2500).contains(&place.fingerprint.radius_mm())), "{places:?}");
     assert_eq!(faults.of(FaultKind::RingBlind), 0);
+}
+
+fn any_echo() -> impl Strategy<Value = Echo> {
+    let near = (900u16..1100).prop_map(|range_mm| Echo::Range { range_mm });
+    let any = any::<u16>().prop_map(|range_mm| Echo::Range { range_mm });
+    prop_oneof![near, any, Just(Echo::Silence), Just(Echo::Dead)]
+}
+
+proptest! {
+    #[test]
+    fn any_frames_and_settings_give_places_within_the_range_and_no_panic(
+        frames in prop::collection::vec(prop::array::uniform16(any_echo()), 1..60),
+        (equidistance_mm, more_mm) in (1u16..3000, 0u16..3000),
+        separation_mrad in 1u16..=2094,
+        (confirm_frames, leave_frames) in (1u8..20, 1u8..20),
+    ) {
+        let config = PlaceConfig {
+            equidistance_mm,
+            leave_mm: equidistance_mm + more_mm,
+            separation_mrad,
+            confirm_frames,
+            leave_frames,
+            range_max_mm: 65_534,
+            live_sensors_min: 3,
+            ..PlaceConfig::DEFAULT
+        };
+        let mut detector = PlaceDetector::<SONARS>::new();
+        detector.start(config, even_ring()).unwrap();
+        for (frame_index, echoes) in frames.iter().enumerate() {
+            if let Some(place) = detector.observe(&RingFrame { echoes: *echoes }) {
+                prop_assert!(place.frame_index as usize <= frame_index);
+                prop_assert!(place.fingerprint.radius_mm() >= config.range_min_mm);
+                prop_assert!(place.spread_mm <= equidistance_mm);
+                prop_assert!(place.degree.is_none_or(|degree| (1..=6).contains(&degree)));
+            }
+        }
+    }
 }

@@ -57,7 +57,7 @@ impl Sighting {
 /// Turns the frames of a ring of `SONARS` sensors into places.
 ///
 /// The ranges are taken from the robot's centre; add the radius of the ring if the sensors measure from its rim.
-/// Memory: about `6 · SONARS + 150` bytes. Time for each frame: `O(SONARS)`, at most six passes over the ring.
+/// Memory: about `6 · SONARS + 160` bytes. Time for each frame: `O(SONARS)`, at most six passes over the ring.
 pub struct PlaceDetector<const SONARS: usize> {
     config: PlaceConfig,
     geometry: RingGeometry<SONARS>,
