@@ -24,6 +24,8 @@ mod map;
 mod ngram;
 pub mod place;
 pub mod ring;
+#[cfg(feature = "wire")]
+pub mod wire;
 
 pub use consistency::{Consistency, Direction, Evidence};
 pub use fault::{FaultCounters, FaultKind};

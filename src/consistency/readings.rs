@@ -7,18 +7,22 @@ use crate::{Fingerprint, History, NgramLength};
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 struct Key {
     label: Fingerprint,
-    /// In units of the n-gram's steps; `u16::MAX` where nothing was read yet.
-    distance: u16,
+    /// One more than the distance in units of the n-gram's steps; 0 where nothing was read yet, so that the whole state
+    /// is zero at first and lies in `.bss`.
+    above_distance: u16,
 }
 
-const NOTHING: Key = Key { label: Fingerprint::ZERO, distance: u16::MAX };
+const NOTHING: Key = Key { label: Fingerprint::ZERO, above_distance: 0 };
 
-/// For every vertex and index, the two newest readings: one at an even distance and one at an odd distance, because
-/// the search asks about neighbouring distances in turn.
+/// How many readings are kept for a vertex and an index: one for each remainder of the distance, because the search asks
+/// about neighbouring distances in turn.
+const PLANES: usize = 4;
+
+/// The readings that were made last.
 #[derive(Clone, Debug)]
 pub(super) struct Readings<const V: usize, const WORDS: usize, const INDICES: usize> {
-    sets: [[[StateSet<WORDS>; V]; 2]; INDICES],
-    keys: [[[Key; V]; 2]; INDICES],
+    sets: [[[StateSet<WORDS>; V]; PLANES]; INDICES],
+    keys: [[[Key; V]; PLANES]; INDICES],
 }
 
 /// All steps of a fingerprint that lie within a distance of a label, the distance in units of the n-gram's steps.
@@ -31,7 +35,7 @@ fn range_steps(length: NgramLength, label: Fingerprint, distance: u16) -> (u16, 
 
 impl<const V: usize, const WORDS: usize, const INDICES: usize> Readings<V, WORDS, INDICES> {
     pub(super) const fn new() -> Self {
-        Self { sets: [[[StateSet::EMPTY; V]; 2]; INDICES], keys: [[[NOTHING; V]; 2]; INDICES] }
+        Self { sets: [[[StateSet::EMPTY; V]; PLANES]; INDICES], keys: [[[NOTHING; V]; PLANES]; INDICES] }
     }
 
     /// The states of the evidence whose label number `index` is within `distance` of the label of a vertex.
@@ -43,17 +47,17 @@ impl<const V: usize, const WORDS: usize, const INDICES: usize> Readings<V, WORDS
         index: u8,
         distance: u16,
     ) -> &StateSet<WORDS> {
-        let plane = if INDICES == 1 { 0 } else { usize::from(index) };
-        let parity = usize::from(distance & 1);
-        let (Some(sets), Some(keys)) = (self.sets.get_mut(plane), self.keys.get_mut(plane)) else {
+        let index_slot = if INDICES == 1 { 0 } else { usize::from(index) };
+        let plane = usize::from(distance) % PLANES;
+        let (Some(sets), Some(keys)) = (self.sets.get_mut(index_slot), self.keys.get_mut(index_slot)) else {
             return const { &StateSet::EMPTY };
         };
         let (Some(set), Some(key)) =
-            (sets[parity].get_mut(usize::from(vertex)), keys[parity].get_mut(usize::from(vertex)))
+            (sets[plane].get_mut(usize::from(vertex)), keys[plane].get_mut(usize::from(vertex)))
         else {
             return const { &StateSet::EMPTY };
         };
-        let wanted = Key { label, distance };
+        let wanted = Key { label, above_distance: distance + 1 };
         if *key != wanted {
             *set = evidence.reading(length, index, range_steps(length, label, distance));
             *key = wanted;
@@ -71,7 +75,7 @@ impl<const V: usize, const WORDS: usize> Readings<V, WORDS, 1> {
         let Some(newest) = history.newest(0) else { return };
         let sets = self.sets.as_flattened_mut().as_flattened_mut();
         for (set, key) in sets.iter_mut().zip(self.keys.as_flattened().as_flattened()) {
-            let (low, high) = range_steps(length, key.label, key.distance);
+            let (low, high) = range_steps(length, key.label, key.above_distance.wrapping_sub(1));
             set.assign(history.newest_slot(), (low..=high).contains(&newest.steps()));
         }
     }

@@ -20,7 +20,7 @@ pub(super) fn target(draw: u32, total: u64) -> u64 {
     // A total has at most 20 bits of weight, 8 of multiplicity and 14 of candidates.
     let (high, low) = (total >> 16, total & 0xFFFF);
     let draw = u64::from(draw);
-    (high * draw + (low * draw >> 16)) >> 16
+    (high * draw + ((low * draw) >> 16)) >> 16
 }
 
 #[cfg(test)]
