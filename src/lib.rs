@@ -24,6 +24,7 @@ mod map;
 mod ngram;
 pub mod place;
 pub mod ring;
+pub mod sonar;
 #[cfg(feature = "wire")]
 pub mod wire;
 
