@@ -36,7 +36,8 @@ pub struct Place {
     /// The frame in which the robot was closest to the meet point, counted from 0 since the start of the detector.
     pub frame_index: u32,
     /// In how many directions the way leads on between the equidistant obstacles, 1 at a dead end; `None` when the
-    /// frames disagree.
+    /// frames disagree. A way that ends within twice the radius is not seen as one, and neither is one between two
+    /// obstacles that are closer in bearing than `separation_mrad`.
     pub degree: Option<u8>,
     /// The smallest spread of the equidistant obstacles, in millimetres: how well the place was seen.
     pub spread_mm: u16,
@@ -58,7 +59,7 @@ impl Sighting {
 /// Turns the frames of a ring of `SONARS` sensors into places.
 ///
 /// The ranges are taken from the robot's centre; add the radius of the ring if the sensors measure from its rim.
-/// Memory: about `6 · SONARS + 150` bytes. Time for each frame: `O(SONARS)`, at most six passes over the ring.
+/// Memory: about `6 · SONARS + 160` bytes. Time for each frame: `O(SONARS)`, at most six passes over the ring.
 #[derive(Clone, Debug)]
 pub struct PlaceDetector<const SONARS: usize> {
     config: PlaceConfig,
