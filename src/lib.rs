@@ -22,8 +22,12 @@ mod history;
 mod likelihood;
 mod map;
 mod ngram;
+pub mod place;
+pub mod reference;
 pub mod ring;
 pub mod sonar;
+#[cfg(feature = "wire")]
+pub mod wire;
 
 pub use consistency::{Consistency, Direction, Evidence};
 pub use fault::{FaultCounters, FaultKind};

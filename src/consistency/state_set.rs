@@ -23,6 +23,10 @@ impl<const WORDS: usize> StateSet<WORDS> {
         }
     }
 
+    pub(super) fn contains(&self, state: usize) -> bool {
+        self.0.get(state / 32).is_some_and(|word| word >> (state % 32) & 1 == 1)
+    }
+
     pub(super) fn insert_all(&mut self, other: &Self) {
         for (word, more) in self.0.iter_mut().zip(other.0) {
             *word |= more;
@@ -44,26 +48,44 @@ impl<const WORDS: usize> StateSet<WORDS> {
         self.0.iter().zip(other.0).all(|(word, wanted)| wanted & !word == 0)
     }
 
+    /// Adds this set to a list of minimal sets, unless one of them lies within it; those that it lies within leave.
+    /// The number of sets in the list is returned, or `None` when there is no room, with nothing changed.
+    pub(super) fn insert_minimal(&self, sets: &mut [Self], held: usize) -> Option<usize> {
+        let mut kept = 0;
+        for index in 0..held {
+            let set = *sets.get(index)?;
+            if self.contains_all(&set) {
+                // Nothing left the list before: what lies within this set would have lain within that one.
+                return Some(held);
+            }
+            if !set.contains_all(self) {
+                *sets.get_mut(kept)? = set;
+                kept += 1;
+            }
+        }
+        *sets.get_mut(kept)? = *self;
+        Some(kept + 1)
+    }
+
     /// Every state moved to the next number; the last one becomes the first.
     pub(super) fn rotated_up(&self) -> Self {
-        let mut moved = *self;
-        let mut carry = self.0.last().map_or(0, |word| word >> 31);
-        for word in &mut moved.0 {
-            let next = *word >> 31;
-            *word = *word << 1 | carry;
-            carry = next;
+        let mut moved = Self::EMPTY;
+        let mut before = self.0.last().copied().unwrap_or(0);
+        for (word, &own) in moved.0.iter_mut().zip(&self.0) {
+            *word = own << 1 | before >> 31;
+            before = own;
         }
         moved
     }
 
-    /// Every state moved to the number before; the first one becomes the last.
-    pub(super) fn rotated_down(&self) -> Self {
-        let mut moved = *self;
-        let mut carry = self.0.first().map_or(0, |word| word << 31);
-        for word in moved.0.iter_mut().rev() {
-            let next = *word << 31;
-            *word = *word >> 1 | carry;
-            carry = next;
+    /// Every state moved to the next number and to the one before; the first and the last are next to each other.
+    pub(super) fn rotated_both_ways(&self) -> Self {
+        let mut moved = Self::EMPTY;
+        let mut before = self.0.last().copied().unwrap_or(0);
+        let behind = self.0.iter().skip(1).chain(self.0.first());
+        for ((word, &own), &next) in moved.0.iter_mut().zip(&self.0).zip(behind) {
+            *word = own << 1 | before >> 31 | own >> 1 | next << 31;
+            before = own;
         }
         moved
     }
@@ -90,7 +112,20 @@ mod tests {
     #[test]
     fn states_move_around_the_ring_either_way() {
         assert_eq!(set(&[0, 31, 63]).rotated_up(), set(&[1, 32, 0]));
-        assert_eq!(set(&[0, 32, 63]).rotated_down(), set(&[63, 31, 62]));
+        assert_eq!(set(&[0, 32]).rotated_both_ways(), set(&[63, 1, 31, 33]));
+        assert_eq!(set(&[63]).rotated_both_ways(), set(&[62, 0]));
         assert_eq!(set(&[1, 33]).halves_swapped(), set(&[33, 1]));
+    }
+
+    #[test]
+    fn only_minimal_sets_are_held() {
+        let mut sets = [StateSet::EMPTY; 2];
+        let mut held = set(&[1, 2, 3]).insert_minimal(&mut sets, 0).unwrap();
+        held = set(&[4, 5]).insert_minimal(&mut sets, held).unwrap();
+        assert_eq!(set(&[1, 2]).insert_minimal(&mut sets, held), Some(2), "replaces the first");
+        assert_eq!(set(&[4, 5, 6]).insert_minimal(&mut sets, held), Some(2), "holds the second");
+        assert!(sets.contains(&set(&[1, 2])) && sets.contains(&set(&[4, 5])));
+        assert_eq!(set(&[7]).insert_minimal(&mut sets, held), None, "no room");
+        assert_eq!(set(&[]).insert_minimal(&mut sets, held), Some(1), "the empty set lies within all");
     }
 }
