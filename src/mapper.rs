@@ -35,9 +35,6 @@ pub struct Mapper<const SONARS: usize, const N: usize, const V: usize, const WOR
     reporter: Reporter<V>,
 }
 
-/// The mapper of the reference robot: 16 sonars, 10 particles, maps of 16 vertices, 256 places of history.
-pub type ReferenceMapper = Mapper<16, 10, 16, 8>;
-
 impl<const SONARS: usize, const N: usize, const V: usize, const WORDS: usize> Mapper<SONARS, N, V, WORDS> {
     /// A mapper that waits for [`Mapper::start`]; all zero, so that a `static` of it lies in `.bss`.
     pub const fn new() -> Self {

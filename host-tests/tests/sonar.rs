@@ -112,6 +112,11 @@ fn ring_with_fault(
 }
 
 #[test]
+fn the_simulated_ring_is_the_reference_robots() {
+    assert_eq!(toposlam_host::world::even_ring(), toposlam::reference::RING);
+}
+
+#[test]
 fn the_ring_reads_the_world_as_it_is_together_or_in_groups() {
     for firing_groups in [1, 2, 3, 4, 16] {
         let mut waited = Waited::default();

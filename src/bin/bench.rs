@@ -19,18 +19,13 @@ use cortex_m_rt::exception;
 use cortex_m_semihosting::{debug, hprintln};
 use defmt_rtt as _;
 use static_cell::ConstStaticCell;
-use toposlam::{Config, Fingerprint, PaperFilter};
+use toposlam::{
+    Fingerprint,
+    reference::{self, Filter},
+};
 
 /// Radii in millimetres, place after place.
 const INPUT_MM: [u16; 200] = include!("support/bench_input.rs");
-const PARTICLES: usize = 10;
-const VERTICES: usize = 16;
-/// 256 observations.
-const HISTORY_WORDS: usize = 8;
-const SEED: u64 = 1;
-
-type Filter = PaperFilter<PARTICLES, VERTICES, HISTORY_WORDS>;
-
 const TICKS_PER_TURN: u32 = 1 << 24;
 static TURNS: AtomicU32 = AtomicU32::new(0);
 
@@ -95,7 +90,7 @@ fn main() -> ! {
     let filter = FILTER.take();
     let costs = COSTS.take();
     let Some(core) = cortex_m::Peripherals::take() else { panic!() };
-    if filter.start(Config::DEFAULT, SEED).is_err() {
+    if filter.start(reference::FILTER, reference::SEED).is_err() {
         panic!()
     }
     let clock = Clock::start(core.SYST);

@@ -22,43 +22,58 @@ use stm32f4xx_hal::{
     serial::{Serial, Tx},
 };
 use toposlam::{
-    FaultCounters, FaultKind,
-    ring::{Echo, RingFrame},
+    FaultCounters, FaultKind, Fingerprint,
+    reference::{self, Detector, Filter, HISTORY_WORDS, PARTICLES, SONARS, VERTICES},
     sonar::{Sc18im700, SonarRing, Srf08Config, Srf08Ring},
+    wire::{Capacities, Encoder, Health, Hello, MAX_FRAME_BYTES, Message, QueueFull, Reporter},
 };
 
-const SONARS: usize = 16;
 const TRANSMIT_BYTES: usize = 2048;
 const BRIDGE_BAUD_AT_RESET: u32 = 9600;
 const BAUD: u32 = 115_200;
 const EMULATED_PAUSE_CYCLES: u32 = 2000;
+const FRAMES_PER_HELLO: u16 = 128;
+const FRAMES_PER_HEALTH: u32 = 256;
+/// Time for some 30 bytes on the line.
+const PACE_US: u32 = 2500;
 
-/// The bytes that wait for USART1.
+const CAPACITIES: Capacities = Capacities {
+    vertices: VERTICES as u8,
+    hypotheses: PARTICLES as u16,
+    history: (HISTORY_WORDS * 32) as u16,
+    ngram_length: reference::FILTER.ngram_length,
+    fingerprint_step_mm: Fingerprint::STEP_MM as u8,
+    sonars: SONARS as u8,
+};
+
+/// The bytes that wait for USART1, and the line itself.
 struct Transmitter {
-    queue: Deque<u8, TRANSMIT_BYTES>,
+    queue: &'static mut Deque<u8, TRANSMIT_BYTES>,
+    line: Tx<pac::USART1>,
+    encoder: Encoder,
+    faults: FaultCounters,
 }
 
 impl Transmitter {
-    const fn new() -> Self {
-        Self { queue: Deque::new() }
-    }
-
     /// Queues a whole message, or drops it and counts that.
-    fn send(&mut self, message: &[u8], faults: &mut FaultCounters) {
-        if self.queue.capacity() - self.queue.len() < message.len() {
-            faults.count(FaultKind::WireFull);
-            return;
+    fn send(&mut self, message: &Message) -> Result<(), QueueFull> {
+        let mut bytes = [0; MAX_FRAME_BYTES];
+        let frame = self.encoder.encode(message, &mut bytes).map_err(|_| QueueFull)?;
+        if self.queue.capacity() - self.queue.len() < frame.len() {
+            self.faults.count(FaultKind::WireFull);
+            return Err(QueueFull);
         }
-        for &byte in message {
+        for &byte in frame {
             // There is room: it was just looked for.
             let _ = self.queue.push_back(byte);
         }
+        Ok(())
     }
 
     /// Hands over what the line takes at once; never waits.
-    fn pump(&mut self, line: &mut impl serial::Write<u8>) {
+    fn pump(&mut self) {
         while let Some(&byte) = self.queue.front() {
-            match line.write(byte) {
+            match serial::Write::write(&mut self.line, byte) {
                 Err(nb::Error::WouldBlock) => break,
                 // A byte that the line refuses is gone; the frame's checksum tells the listener.
                 Ok(()) | Err(nb::Error::Other(_)) => self.queue.pop_front(),
@@ -70,8 +85,7 @@ impl Transmitter {
 /// Waits for the sonars and uses the time to send.
 struct SendingDelay<'a> {
     cycles_per_slice: u32,
-    line: Tx<pac::USART1>,
-    transmitter: &'a RefCell<&'static mut Transmitter>,
+    transmitter: &'a RefCell<Transmitter>,
 }
 
 impl SendingDelay<'_> {
@@ -79,9 +93,9 @@ impl SendingDelay<'_> {
     const SLICES_PER_SECOND: u32 = 20_000;
     const SLICE_NS: u32 = 1_000_000_000 / Self::SLICES_PER_SECOND;
 
-    fn pump(&mut self) {
+    fn pump(&self) {
         if let Ok(mut transmitter) = self.transmitter.try_borrow_mut() {
-            transmitter.pump(&mut self.line);
+            transmitter.pump();
         }
     }
 }
@@ -128,25 +142,18 @@ impl<UART: serial::Write<u8>> serial::Write<u8> for PausingUart<UART> {
     }
 }
 
-/// A raw frame: a marker and for each sonar the range in millimetres, 0 for silence and 65,535 for a dead one.
-fn raw(frame: &RingFrame<SONARS>) -> [u8; 2 + 2 * SONARS] {
-    let mut bytes = [0xA5; 2 + 2 * SONARS];
-    for (pair, echo) in bytes.chunks_exact_mut(2).skip(1).zip(frame.echoes) {
-        let value = match echo {
-            Echo::Range { range_mm } => range_mm,
-            Echo::Silence => 0,
-            Echo::Dead => u16::MAX,
-        };
-        for (byte, part) in pair.iter_mut().zip(value.to_be_bytes()) {
-            *byte = part;
-        }
-    }
-    bytes
+/// The small stages.
+struct Stages {
+    detector: Detector,
+    reporter: Reporter<VERTICES>,
 }
 
 #[cortex_m_rt::entry]
 fn main() -> ! {
-    static TRANSMITTER: ConstStaticCell<Transmitter> = ConstStaticCell::new(Transmitter::new());
+    static STAGES: ConstStaticCell<Stages> =
+        ConstStaticCell::new(Stages { detector: Detector::new(), reporter: Reporter::new() });
+    static QUEUE: ConstStaticCell<Deque<u8, TRANSMIT_BYTES>> = ConstStaticCell::new(Deque::new());
+    static FILTER: ConstStaticCell<Filter> = ConstStaticCell::new(Filter::new());
 
     let is_emulated = support::is_emulated();
     let Some(device) = pac::Peripherals::take() else {
@@ -176,21 +183,63 @@ fn main() -> ! {
         defmt::warn!("the bridge to the sonars: {}", error);
     }
 
-    let transmitter = RefCell::new(TRANSMITTER.take());
+    let Stages { detector, reporter } = STAGES.take();
+    let queue = QUEUE.take();
+    let filter = FILTER.take();
+    if detector.start(reference::PLACE, reference::RING).is_err()
+        || filter.start(reference::FILTER, reference::SEED).is_err()
+    {
+        panic!()
+    }
+    reporter.start(Hello::new(0, reference::SEED, CAPACITIES), FRAMES_PER_HELLO);
+    // One zero, so that noise from the start does not spoil the first frame.
+    let _ = queue.push_back(0);
+    let transmitter = Transmitter { queue, line, encoder: Encoder::default(), faults: FaultCounters::new() };
+    let transmitter = RefCell::new(transmitter);
+
     let cycles_per_slice = rcc.clocks.sysclk().raw() / SendingDelay::SLICES_PER_SECOND;
-    let delay = SendingDelay { cycles_per_slice, line, transmitter: &transmitter };
+    let delay = SendingDelay { cycles_per_slice, transmitter: &transmitter };
+    let mut pace = SendingDelay { cycles_per_slice, transmitter: &transmitter };
     let Ok(mut ring) = Srf08Ring::<_, _, SONARS>::new(bridge, delay, Srf08Config::DEFAULT) else { panic!() };
-    let mut faults = FaultCounters::new();
+    let mut ring_faults = FaultCounters::new();
     defmt::info!("{} sonars, clock {} Hz", SONARS, rcc.clocks.sysclk().raw());
+    let mut loop_count = 0_u32;
     loop {
-        let frame = ring.read(&mut faults);
+        let frame = ring.read(&mut ring_faults);
         if let Some(error) = ring.last_error() {
-            defmt::warn!("{}", error);
+            defmt::debug!("{}", error);
         }
         if let Ok(mut transmitter) = transmitter.try_borrow_mut() {
-            transmitter.send(&raw(&frame), &mut faults);
+            if let Some(place) = detector.observe(&frame) {
+                let update = filter.observe(place.fingerprint);
+                defmt::info!("place {} is vertex {}", update.place_index, update.vertex);
+                // A message that finds no room is counted, and the rolling picture makes up for it.
+                let _ = transmitter.send(&Message::Place {
+                    place_index: update.place_index,
+                    frame_index: place.frame_index,
+                    radius_mm: place.fingerprint.radius_mm(),
+                    degree: place.degree,
+                });
+                reporter.update(filter.map(), &update, |message| transmitter.send(message));
+            }
+            if loop_count % FRAMES_PER_HEALTH == 0 {
+                let _ = transmitter.send(&Message::Health(health(loop_count)));
+            }
+            let mut faults = ring_faults;
+            for more in [detector.faults(), filter.faults(), &transmitter.faults] {
+                faults.add(more);
+            }
+            reporter.tick(filter.map(), &faults, |message| transmitter.send(message));
         }
+        // A ring that is not there answers at once; the line still gets its time.
+        pace.delay_us(PACE_US);
+        loop_count = loop_count.wrapping_add(1);
     }
+}
+
+fn health(loop_count: u32) -> Health {
+    let stack_high_water_bytes = u32::try_from(support::stack_high_water_bytes()).unwrap_or(u32::MAX);
+    Health { loop_count, stack_high_water_bytes, ..Health::default() }
 }
 
 /// The internal 16 MHz oscillator, directly or, with the feature `pll`, multiplied to 168 MHz. The emulator has no PLL.
