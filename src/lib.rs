@@ -14,11 +14,17 @@
 #![cfg_attr(not(test), no_std)]
 #![forbid(unsafe_code)]
 
+mod consistency;
 mod fault;
 mod fingerprint;
+mod history;
 mod map;
+mod ngram;
 pub mod ring;
 
+pub use consistency::{Consistency, Direction, Evidence};
 pub use fault::{FaultCounters, FaultKind};
 pub use fingerprint::{Fingerprint, FingerprintError};
+pub use history::History;
 pub use map::{Map, VerticesFull};
+pub use ngram::{Ngram, NgramError, NgramLength, NgramTable, NgramsFull};

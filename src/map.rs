@@ -35,7 +35,7 @@ impl Label {
 /// A labelled graph of at most `V` vertices (`V` ≤ 64), numbered from 0 in the order in which they were added.
 ///
 /// Adjacency is one bit row a vertex: bit `w` of row `v` says that an edge joins `v` and `w`. An edge from a vertex to
-/// itself is a corridor that leads back to the place it left. Memory: 20 bytes a vertex.
+/// itself is a corridor that leads back to the place it left. Memory: 18 bytes a vertex.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Map<const V: usize> {
     vertices: u8,
@@ -60,6 +60,11 @@ impl<const V: usize> Map<V> {
     /// The label of a vertex, the rounded mean of its fingerprints; `None` for a vertex the map does not have.
     pub fn label(&self, vertex: u8) -> Option<Fingerprint> {
         self.labels().get(usize::from(vertex)).copied()
+    }
+
+    /// The label of a vertex that the map has.
+    pub(crate) fn label_of(&self, vertex: u8) -> Fingerprint {
+        self.means.get(usize::from(vertex)).copied().unwrap_or(Fingerprint::ZERO)
     }
 
     /// The labels of all vertices in the order of their numbers.

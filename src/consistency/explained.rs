@@ -1,0 +1,48 @@
+//! From the evidence to the map: is every n-gram of the evidence near some walk of the map?
+
+use super::{Consistency, evidence::Evidence, state_set::StateSet};
+use crate::{Map, NgramLength, map::bits};
+
+impl<const V: usize, const WORDS: usize, const INDICES: usize> Consistency<V, WORDS, INDICES> {
+    /// Whether max over the evidence of min over the map's walks of Eq. 3 is at most `distance`.
+    ///
+    /// All n-grams are read at once: after label `k`, `reached[v]` holds those whose first `k + 1` labels some walk that
+    /// ends at vertex `v` matches. Cost: O(n · edges · WORDS).
+    pub(super) fn explains(
+        &mut self,
+        map: &Map<V>,
+        evidence: &impl Evidence<WORDS>,
+        length: NgramLength,
+        distance: u16,
+    ) -> bool {
+        let labels = evidence.straight_labels(length);
+        if labels == 0 {
+            return true;
+        }
+        let [reached, next] = &mut self.reached;
+        for (set, vertex) in reached.iter_mut().zip(0..map.vertices()) {
+            *set = *self.readings.at(evidence, length, (vertex, map.label_of(vertex)), 0, distance);
+        }
+        for index in 1..labels {
+            for set in reached.iter_mut().take(usize::from(map.vertices())) {
+                *set = evidence.onward(set);
+            }
+            for (set, vertex) in next.iter_mut().zip(0..map.vertices()) {
+                let mut arriving = StateSet::EMPTY;
+                for neighbour in bits(map.neighbours(vertex)) {
+                    if let Some(from) = reached.get(usize::from(neighbour)) {
+                        arriving.insert_all(from);
+                    }
+                }
+                let vertex = (vertex, map.label_of(vertex));
+                *set = arriving.intersection(self.readings.at(evidence, length, vertex, index, distance));
+            }
+            core::mem::swap(reached, next);
+        }
+        let mut explained = StateSet::EMPTY;
+        for set in reached.iter().take(usize::from(map.vertices())) {
+            explained.insert_all(set);
+        }
+        explained.contains_all(&evidence.ends(labels))
+    }
+}

@@ -1,0 +1,154 @@
+//! How consistent a map is with a set of n-grams: the Hausdorff distance of Eq. 2 and 3, exactly and in integers,
+//! without enumerating the walks of the map.
+//!
+//! The distance is the smallest threshold at which two questions are both answered with yes: does the map explain every
+//! n-gram of the evidence (`explained`), and does the evidence confirm every walk of the map (`confirmed`)? Both are
+//! monotone in the threshold, so a search over integers finds it.
+
+mod confirmed;
+mod evidence;
+mod explained;
+mod readings;
+mod state_set;
+
+pub use evidence::Evidence;
+
+use crate::{Map, NgramLength};
+use readings::Readings;
+use state_set::StateSet;
+
+/// Which half of Eq. 2 is taken.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Direction {
+    /// The larger of the two directed distances: Eq. 2 as printed.
+    TwoSided,
+    /// From the walks of the map to the evidence: what is not mapped yet costs nothing.
+    MapToHistory,
+    /// From the evidence to the walks of the map: what the map holds beyond the evidence costs nothing.
+    HistoryToMap,
+}
+
+/// The scratch memory of the consistency measure for maps of `V` vertices and evidence of `WORDS` words.
+///
+/// `INDICES` is 1 for a [`History`](crate::History), whose labels read the same at every index of an n-gram, and 7 for
+/// an [`NgramTable`](crate::NgramTable). Memory: about `(2 · INDICES + 2) · V · 4 · WORDS` bytes.
+#[derive(Clone, Debug)]
+pub struct Consistency<const V: usize, const WORDS: usize, const INDICES: usize> {
+    readings: Readings<V, WORDS, INDICES>,
+    /// Where straight readings of the evidence have got to at each vertex; two rows, used in turn.
+    reached: [[StateSet<WORDS>; V]; 2],
+    /// One block of the readings that end at a vertex.
+    arms: [StateSet<WORDS>; confirmed::BLOCK],
+    /// The vertex whose walks were refuted last: the first to ask the next time.
+    suspect: u8,
+}
+
+impl<const V: usize, const WORDS: usize, const INDICES: usize> Consistency<V, WORDS, INDICES> {
+    /// Scratch memory that holds nothing yet.
+    pub const fn new() -> Self {
+        Self {
+            readings: Readings::new(),
+            reached: [[StateSet::EMPTY; V]; 2],
+            arms: [StateSet::EMPTY; confirmed::BLOCK],
+            suspect: 0,
+        }
+    }
+
+    /// The distance of Eq. 2, or one directed half of it, in units of [`NgramLength::label_step_mm`].
+    ///
+    /// The maximum over an empty set is 0 and the minimum is infinite, for which `None` stands.
+    /// Cost: O(log(range) · V · Δⁿᐟ² · WORDS) for a largest degree of Δ in the sparse maps of buildings.
+    pub fn distance_steps(
+        &mut self,
+        map: &Map<V>,
+        evidence: &impl Evidence<WORDS>,
+        length: NgramLength,
+        direction: Direction,
+    ) -> Option<u16> {
+        self.readings.forget();
+        let largest = crate::Fingerprint::MAX.steps() >> length.coarsening();
+        self.search(map, evidence, length, direction, 0, largest)
+    }
+
+    /// The distance, if it is not above a limit. The hint is a guess, near which the search starts. Readings are kept
+    /// from call to call, so the evidence must be the same, or [`Consistency::forget`] be called between.
+    pub(crate) fn search(
+        &mut self,
+        map: &Map<V>,
+        evidence: &impl Evidence<WORDS>,
+        length: NgramLength,
+        direction: Direction,
+        hint: u16,
+        limit: u16,
+    ) -> Option<u16> {
+        let mut holds = |distance: u16| self.holds(map, evidence, length, direction, distance);
+        let (mut refuted, mut held);
+        let mut stride = 1;
+        let guess = hint.min(limit);
+        if holds(guess) {
+            held = guess;
+            loop {
+                let Some(below) = held.checked_sub(1) else { return Some(held) };
+                refuted = below.saturating_sub(stride - 1);
+                if !holds(refuted) {
+                    break;
+                }
+                held = refuted;
+                stride *= 2;
+            }
+        } else {
+            refuted = guess;
+            loop {
+                if refuted >= limit {
+                    return None;
+                }
+                held = refuted.saturating_add(stride).min(limit);
+                if holds(held) {
+                    break;
+                }
+                refuted = held;
+                stride *= 2;
+            }
+        }
+        while held - refuted > 1 {
+            let middle = refuted + (held - refuted) / 2;
+            if holds(middle) { held = middle } else { refuted = middle }
+        }
+        Some(held)
+    }
+
+    fn holds(
+        &mut self,
+        map: &Map<V>,
+        evidence: &impl Evidence<WORDS>,
+        length: NgramLength,
+        direction: Direction,
+        distance: u16,
+    ) -> bool {
+        let (confirmed, explained) = match direction {
+            Direction::TwoSided => (true, true),
+            Direction::MapToHistory => (true, false),
+            Direction::HistoryToMap => (false, true),
+        };
+        (!confirmed || self.confirms(map, evidence, length, distance))
+            && (!explained || self.explains(map, evidence, length, distance))
+    }
+
+    /// Forgets the readings of the evidence, because it changed.
+    pub(crate) fn forget(&mut self) {
+        self.readings.forget();
+    }
+}
+
+impl<const V: usize, const WORDS: usize> Consistency<V, WORDS, 1> {
+    /// Brings the readings of a history up to date with its newest observation.
+    pub(crate) fn include_newest(&mut self, history: &crate::History<WORDS>, length: NgramLength) {
+        self.readings.include_newest(history, length);
+    }
+}
+
+impl<const V: usize, const WORDS: usize, const INDICES: usize> Default for Consistency<V, WORDS, INDICES> {
+    fn default() -> Self {
+        Self::new()
+    }
+}

@@ -1,0 +1,78 @@
+//! The states at which one label of the evidence agrees with one vertex of the map, kept between questions.
+
+use super::{evidence::Evidence, state_set::StateSet};
+use crate::{Fingerprint, History, NgramLength};
+
+/// What a reading was made for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+struct Key {
+    label: Fingerprint,
+    /// In units of the n-gram's steps; `u16::MAX` where nothing was read yet.
+    distance: u16,
+}
+
+const NOTHING: Key = Key { label: Fingerprint::ZERO, distance: u16::MAX };
+
+/// For every vertex and index, the two newest readings: one at an even distance and one at an odd distance, because
+/// the search asks about neighbouring distances in turn.
+#[derive(Clone, Debug)]
+pub(super) struct Readings<const V: usize, const WORDS: usize, const INDICES: usize> {
+    sets: [[[StateSet<WORDS>; V]; 2]; INDICES],
+    keys: [[[Key; V]; 2]; INDICES],
+}
+
+/// All steps of a fingerprint that lie within a distance of a label, the distance in units of the n-gram's steps.
+fn range_steps(length: NgramLength, label: Fingerprint, distance: u16) -> (u16, u16) {
+    let coarse = label.steps() >> length.coarsening();
+    let low = coarse.saturating_sub(distance) << length.coarsening();
+    let high = coarse.saturating_add(distance).min(Fingerprint::MAX.steps() >> length.coarsening());
+    (low, high << length.coarsening() | ((1 << length.coarsening()) - 1))
+}
+
+impl<const V: usize, const WORDS: usize, const INDICES: usize> Readings<V, WORDS, INDICES> {
+    pub(super) const fn new() -> Self {
+        Self { sets: [[[StateSet::EMPTY; V]; 2]; INDICES], keys: [[[NOTHING; V]; 2]; INDICES] }
+    }
+
+    /// The states of the evidence whose label number `index` is within `distance` of the label of a vertex.
+    pub(super) fn at(
+        &mut self,
+        evidence: &impl Evidence<WORDS>,
+        length: NgramLength,
+        (vertex, label): (u8, Fingerprint),
+        index: u8,
+        distance: u16,
+    ) -> &StateSet<WORDS> {
+        let plane = if INDICES == 1 { 0 } else { usize::from(index) };
+        let parity = usize::from(distance & 1);
+        let (Some(sets), Some(keys)) = (self.sets.get_mut(plane), self.keys.get_mut(plane)) else {
+            return const { &StateSet::EMPTY };
+        };
+        let (Some(set), Some(key)) =
+            (sets[parity].get_mut(usize::from(vertex)), keys[parity].get_mut(usize::from(vertex)))
+        else {
+            return const { &StateSet::EMPTY };
+        };
+        let wanted = Key { label, distance };
+        if *key != wanted {
+            *set = evidence.reading(length, index, range_steps(length, label, distance));
+            *key = wanted;
+        }
+        set
+    }
+
+    pub(super) fn forget(&mut self) {
+        self.keys.as_flattened_mut().as_flattened_mut().fill(NOTHING);
+    }
+}
+
+impl<const V: usize, const WORDS: usize> Readings<V, WORDS, 1> {
+    pub(super) fn include_newest(&mut self, history: &History<WORDS>, length: NgramLength) {
+        let Some(newest) = history.newest(0) else { return };
+        let sets = self.sets.as_flattened_mut().as_flattened_mut();
+        for (set, key) in sets.iter_mut().zip(self.keys.as_flattened().as_flattened()) {
+            let (low, high) = range_steps(length, key.label, key.distance);
+            set.assign(history.newest_slot(), (low..=high).contains(&newest.steps()));
+        }
+    }
+}
