@@ -16,14 +16,17 @@
 
 mod consistency;
 mod fault;
+mod filter;
 mod fingerprint;
 mod history;
+mod likelihood;
 mod map;
 mod ngram;
 pub mod ring;
 
 pub use consistency::{Consistency, Direction, Evidence};
 pub use fault::{FaultCounters, FaultKind};
+pub use filter::{Config, ConfigError, PaperFilter, Particle, Prior, Update, WeightFactors};
 pub use fingerprint::{Fingerprint, FingerprintError};
 pub use history::History;
 pub use map::{Map, VerticesFull};

@@ -20,7 +20,7 @@ impl<const WORDS: usize> NgramTable<WORDS> {
 
     /// An empty table of n-grams of one length.
     pub const fn new(length: NgramLength) -> Self {
-        const { assert!(WORDS % 2 == 0 && WORDS <= 1024, "each direction of travel takes half of the words") };
+        const { assert!(WORDS.is_multiple_of(2) && WORDS <= 1024, "each direction of travel takes half of the words") };
         Self { length, ngrams: [[Ngram(0); 16]; WORDS], count: 0 }
     }
 

@@ -1,0 +1,93 @@
+//! The parameters of the paper's filter.
+
+use crate::{Direction, NgramLength};
+use core::fmt;
+
+/// The parameters of the paper's filter. The defaults are the paper's where it gives them.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Config {
+    /// `n`: how many labels an n-gram has, 2 to 7. Default 5 (Section IV).
+    pub ngram_length: u8,
+    /// `N`: how many particles represent the posterior, 1 to the filter's capacity. Default 10 (Section IV).
+    pub particles: u8,
+    /// φ of Eq. 9 in thousandths, 0 to 999: the price of vertices that look alike. Default 100 (Section IV).
+    pub penalty_permille: u16,
+    /// σ_l of Eq. 7 and 9 in millimetres, 1 to 8188. Default 50; the paper does not give it.
+    pub sigma_label_mm: u16,
+    /// σ_c of Eq. 8 in millimetres, 1 to 8188. Default 30; the paper does not give it.
+    pub sigma_consistency_mm: u16,
+    /// Which half of Eq. 2 is taken. Default [`Direction::TwoSided`], as printed.
+    pub direction: Direction,
+}
+
+impl Default for Config {
+    fn default() -> Self {
+        Self::DEFAULT
+    }
+}
+
+impl Config {
+    /// The defaults.
+    pub const DEFAULT: Self = Self {
+        ngram_length: 5,
+        particles: 10,
+        penalty_permille: 100,
+        sigma_label_mm: 50,
+        sigma_consistency_mm: 30,
+        direction: Direction::TwoSided,
+    };
+
+    /// Checks every field for a filter with room for `capacity` particles; returns the length of the n-grams.
+    ///
+    /// # Errors
+    /// [`ConfigError`] names the first field that is out of its range.
+    pub fn check(&self, capacity: usize) -> Result<NgramLength, ConfigError> {
+        let length = NgramLength::new(self.ngram_length).map_err(|_| ConfigError("ngram_length"))?;
+        let sigmas = 1..=8188;
+        match () {
+            () if self.particles == 0 || usize::from(self.particles) > capacity => Err(ConfigError("particles")),
+            () if self.penalty_permille > 999 => Err(ConfigError("penalty_permille")),
+            () if !sigmas.contains(&self.sigma_label_mm) => Err(ConfigError("sigma_label_mm")),
+            () if !sigmas.contains(&self.sigma_consistency_mm) => Err(ConfigError("sigma_consistency_mm")),
+            () => Ok(length),
+        }
+    }
+}
+
+/// A field of a [`Config`] is out of its range; it holds the name of the field.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct ConfigError(pub &'static str);
+
+impl fmt::Display for ConfigError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{} is out of its range", self.0)
+    }
+}
+
+impl core::error::Error for ConfigError {}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_defaults_are_valid() {
+        assert_eq!(Config::default().check(10).map(NgramLength::get), Ok(5));
+    }
+
+    #[test]
+    fn every_field_out_of_its_range_is_named() {
+        let default = Config::default();
+        for (config, field) in [
+            (Config { ngram_length: 1, ..default }, "ngram_length"),
+            (Config { ngram_length: 8, ..default }, "ngram_length"),
+            (Config { particles: 0, ..default }, "particles"),
+            (Config { particles: 11, ..default }, "particles"),
+            (Config { penalty_permille: 1000, ..default }, "penalty_permille"),
+            (Config { sigma_label_mm: 0, ..default }, "sigma_label_mm"),
+            (Config { sigma_consistency_mm: 8189, ..default }, "sigma_consistency_mm"),
+        ] {
+            assert_eq!(config.check(10), Err(ConfigError(field)));
+        }
+    }
+}

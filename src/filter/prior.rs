@@ -1,0 +1,51 @@
+//! What is known of the environment from an earlier exploration: Γ_env of the paper.
+
+use crate::{Consistency, Ngram, NgramLength, NgramTable, NgramsFull};
+
+/// The n-grams of an earlier exploration, at most `16 · WORDS` of them, with the scratch memory to hold maps of `V`
+/// vertices against them.
+///
+/// Memory: about `64 · WORDS · V + 192 · WORDS` bytes.
+#[derive(Clone, Debug)]
+pub struct Prior<const V: usize, const WORDS: usize> {
+    ngrams: NgramTable<WORDS>,
+    consistency: Consistency<V, WORDS, 7>,
+}
+
+impl<const V: usize, const WORDS: usize> Prior<V, WORDS> {
+    /// A prior without n-grams.
+    pub const fn new(length: NgramLength) -> Self {
+        Self { ngrams: NgramTable::new(length), consistency: Consistency::new() }
+    }
+
+    /// The n-grams of the prior.
+    pub const fn ngrams(&self) -> &NgramTable<WORDS> {
+        &self.ngrams
+    }
+
+    /// Adds one n-gram; says whether it is new.
+    ///
+    /// # Errors
+    /// [`NgramsFull`] when there is no room for it; the prior stays as it is.
+    pub fn insert(&mut self, ngram: Ngram) -> Result<bool, NgramsFull> {
+        self.consistency.forget();
+        self.ngrams.insert(ngram)
+    }
+
+    /// Adds what the newest observation of an exploration brings; see [`NgramTable::extend`].
+    ///
+    /// # Errors
+    /// [`NgramsFull`] when some n-grams did not fit; the others were added.
+    pub fn extend<const POSITIONS: usize>(
+        &mut self,
+        exploration: &crate::History<POSITIONS>,
+    ) -> Result<(), NgramsFull> {
+        self.consistency.forget();
+        self.ngrams.extend(exploration)
+    }
+
+    /// The n-grams and the scratch memory, both at once.
+    pub(super) fn split(&mut self) -> (&NgramTable<WORDS>, &mut Consistency<V, WORDS, 7>) {
+        (&self.ngrams, &mut self.consistency)
+    }
+}
