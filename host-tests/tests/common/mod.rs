@@ -3,6 +3,7 @@
 //! The reference counts in millimetres of an f64, the core in steps of 2 mm; every label here is on that grid.
 #![allow(dead_code, unreachable_pub, reason = "each test binary compiles this and uses its own part")]
 
+pub mod drive;
 pub mod random;
 
 use toposlam::{Consistency, Direction, Evidence, Fingerprint, History, Map, NgramLength, NgramTable};

@@ -1,0 +1,57 @@
+//! The paper's filter: weights of the core within a stated tolerance of the reference's, and the same choice on the same
+//! random draws.
+
+mod common;
+
+use common::drive::{Drive, Evidence, Random, Tally};
+use toposlam::{Config, Direction};
+
+const DIRECTIONS: [Direction; 3] = [Direction::TwoSided, Direction::MapToHistory, Direction::HistoryToMap];
+
+/// A random configuration with small n, so that the reference can enumerate.
+fn config(random: &mut Random, direction: Direction) -> Config {
+    // Beyond a σ_l of 113 mm the core interpolates Eq. 9, which is coarse for a φ near 1.
+    let (largest_sigma_label_mm, penalties_permille) =
+        if random.below(2) == 0 { (113, [0, 100, 300, 900, 999]) } else { (300, [0, 50, 100, 200, 300]) };
+    Config {
+        ngram_length: [2, 3, 3, 4, 5][random.below(5)],
+        particles: 1 + random.below(10) as u8,
+        penalty_permille: penalties_permille[random.below(5)],
+        sigma_label_mm: 10 + random.below(largest_sigma_label_mm - 9) as u16,
+        sigma_consistency_mm: 10 + random.below(150) as u16,
+        direction,
+    }
+}
+
+/// Drives both filters through so many buildings; they agree at every place, and ties are rare.
+fn agree(drives: u64, with_prior: bool) {
+    let mut tally = Tally::default();
+    for seed in 0..drives {
+        let mut random = Random(seed);
+        let config = config(&mut random, DIRECTIONS[seed as usize % 3]);
+        let places = 2 + random.below(6);
+        let building = random.building(places);
+        let noise_steps = [0, 3, 15][random.below(3)];
+        let evidence =
+            if with_prior { Evidence::Prior(random.walk(&building, 30, noise_steps)) } else { Evidence::OnLine };
+        let mut drive = Drive::new(config, &evidence);
+        for observation_mm in random.walk(&building, 14, noise_steps) {
+            drive.observe(observation_mm, &mut random);
+        }
+        tally.draws += drive.tally.draws;
+        tally.ties += drive.tally.ties;
+        tally.differing += drive.tally.differing;
+    }
+    println!("{tally:?}");
+    assert!(tally.ties * 200 < tally.draws, "ties are rare: {tally:?}");
+}
+
+#[test]
+fn the_filter_on_line_draws_what_the_reference_draws() {
+    agree(300, false);
+}
+
+#[test]
+fn the_filter_with_a_prior_draws_what_the_reference_draws() {
+    agree(300, true);
+}
