@@ -55,3 +55,39 @@ fn the_filter_on_line_draws_what_the_reference_draws() {
 fn the_filter_with_a_prior_draws_what_the_reference_draws() {
     agree(300, true);
 }
+
+#[test]
+fn maps_too_far_from_the_evidence_to_tell_apart_are_drawn_by_the_other_factors() {
+    // Eq. 8 saturates at 64 σ_c, here at 64 to 256 mm: most maps are beyond.
+    for seed in 0..150 {
+        let mut random = Random(seed);
+        let building = random.building(4);
+        let config = Config {
+            ngram_length: 3,
+            particles: 10,
+            sigma_consistency_mm: 1 + random.below(4) as u16,
+            sigma_label_mm: 100,
+            direction: DIRECTIONS[seed as usize % 3],
+            ..Config::DEFAULT
+        };
+        let evidence =
+            if random.below(2) == 0 { Evidence::OnLine } else { Evidence::Prior(random.walk(&building, 20, 15)) };
+        let mut drive = Drive::new(config, &evidence);
+        for observation_mm in random.walk(&building, 12, 15) {
+            drive.observe(observation_mm, &mut random);
+        }
+    }
+}
+
+#[test]
+fn an_empty_prior_leaves_the_choice_to_the_other_factors() {
+    for (seed, direction) in (0..).zip(DIRECTIONS.into_iter().cycle().take(30)) {
+        let mut random = Random(seed);
+        let config = Config { ngram_length: 3, direction, ..Config::DEFAULT };
+        let mut drive = Drive::new(config, &Evidence::Prior(Vec::new()));
+        let building = random.building(4);
+        for observation_mm in random.walk(&building, 10, 5) {
+            drive.observe(observation_mm, &mut random);
+        }
+    }
+}
