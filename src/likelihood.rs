@@ -27,8 +27,8 @@ impl Likelihood {
     /// Constants that must be set before use.
     pub(crate) const fn new() -> Self {
         Self {
-            label_scale: Scale::new(1),
-            consistency_scale: Scale::new(1),
+            label_scale: Scale::UNSET,
+            consistency_scale: Scale::UNSET,
             penalties: [0; PENALTIES],
             penalty_stride: 0,
         }
@@ -115,6 +115,8 @@ struct Scale {
 }
 
 impl Scale {
+    const UNSET: Self = Self { sigma: 0, reciprocal: 0 };
+
     const fn new(sigma: u16) -> Self {
         let sigma = if sigma == 0 { 1 } else { sigma };
         Self { sigma, reciprocal: (1 << 40) / (sigma as u64 * sigma as u64) }

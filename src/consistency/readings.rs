@@ -7,11 +7,12 @@ use crate::{Fingerprint, History, NgramLength};
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 struct Key {
     label: Fingerprint,
-    /// In units of the n-gram's steps; `u16::MAX` where nothing was read yet.
-    distance: u16,
+    /// One more than the distance in units of the n-gram's steps; 0 where nothing was read yet, so that the whole state
+    /// is zero at first and lies in `.bss`.
+    above_distance: u16,
 }
 
-const NOTHING: Key = Key { label: Fingerprint::ZERO, distance: u16::MAX };
+const NOTHING: Key = Key { label: Fingerprint::ZERO, above_distance: 0 };
 
 /// For every vertex and index, the two newest readings: one at an even distance and one at an odd distance, because
 /// the search asks about neighbouring distances in turn.
@@ -53,7 +54,7 @@ impl<const V: usize, const WORDS: usize, const INDICES: usize> Readings<V, WORDS
         else {
             return const { &StateSet::EMPTY };
         };
-        let wanted = Key { label, distance };
+        let wanted = Key { label, above_distance: distance + 1 };
         if *key != wanted {
             *set = evidence.reading(length, index, range_steps(length, label, distance));
             *key = wanted;
@@ -71,7 +72,7 @@ impl<const V: usize, const WORDS: usize> Readings<V, WORDS, 1> {
         let Some(newest) = history.newest(0) else { return };
         let sets = self.sets.as_flattened_mut().as_flattened_mut();
         for (set, key) in sets.iter_mut().zip(self.keys.as_flattened().as_flattened()) {
-            let (low, high) = range_steps(length, key.label, key.distance);
+            let (low, high) = range_steps(length, key.label, key.above_distance.wrapping_sub(1));
             set.assign(history.newest_slot(), (low..=high).contains(&newest.steps()));
         }
     }

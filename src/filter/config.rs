@@ -37,6 +37,16 @@ impl Config {
         direction: Direction::TwoSided,
     };
 
+    /// What a filter holds before it is started: all zero.
+    pub(super) const UNSET: Self = Self {
+        ngram_length: 0,
+        particles: 0,
+        penalty_permille: 0,
+        sigma_label_mm: 0,
+        sigma_consistency_mm: 0,
+        direction: Direction::TwoSided,
+    };
+
     /// Checks every field for a filter with room for `capacity` particles; returns the length of the n-grams.
     ///
     /// # Errors

@@ -56,7 +56,6 @@ pub struct Update {
 #[derive(Clone, Debug)]
 pub struct PaperFilter<const N: usize, const V: usize, const WORDS: usize> {
     config: Config,
-    length: NgramLength,
     seed: u64,
     observed: u32,
     particles: Particles<N, V>,
@@ -66,13 +65,11 @@ pub struct PaperFilter<const N: usize, const V: usize, const WORDS: usize> {
 }
 
 impl<const N: usize, const V: usize, const WORDS: usize> PaperFilter<N, V, WORDS> {
-    /// A filter that has observed nothing; call [`PaperFilter::start`] before the first observation, or it runs with
-    /// one particle.
+    /// A filter that is yet to be set up by [`PaperFilter::start`]; before that, observations are lost.
     pub const fn new() -> Self {
         const { assert!(N >= 1 && N <= 255, "a filter has 1 to 255 particles") };
         Self {
-            config: Config { particles: 1, ..Config::DEFAULT },
-            length: NgramLength::MIN,
+            config: Config::UNSET,
             seed: 0,
             observed: 0,
             particles: Particles::new(),
@@ -87,7 +84,7 @@ impl<const N: usize, const V: usize, const WORDS: usize> PaperFilter<N, V, WORDS
     /// # Errors
     /// [`ConfigError`] names the first field that is out of its range; the filter goes on as it was.
     pub fn start(&mut self, config: Config, seed: u64) -> Result<(), ConfigError> {
-        self.length = config.check(N)?;
+        config.check(N)?;
         self.config = config;
         self.seed = seed;
         self.observed = 0;
@@ -121,7 +118,7 @@ impl<const N: usize, const V: usize, const WORDS: usize> PaperFilter<N, V, WORDS
     pub fn observe_with_draws(&mut self, fingerprint: Fingerprint, draws: &[u32; N]) -> Update {
         self.remember(fingerprint);
         let step = self.particles.step(
-            self.length,
+            self.length(),
             self.config.direction,
             fingerprint,
             draws,
@@ -152,11 +149,16 @@ impl<const N: usize, const V: usize, const WORDS: usize> PaperFilter<N, V, WORDS
         core::array::from_fn(|_| random.next_u32())
     }
 
+    fn length(&self) -> NgramLength {
+        NgramLength::new(self.config.ngram_length).unwrap_or(NgramLength::MIN)
+    }
+
     fn remember(&mut self, fingerprint: Fingerprint) {
         if self.history.push(fingerprint).is_some() {
             self.faults.count(FaultKind::HistoryFull);
         }
-        self.consistency.include_newest(&self.history, self.length);
+        let length = self.length();
+        self.consistency.include_newest(&self.history, length);
     }
 
     fn finish(&mut self, step: Step) -> Update {

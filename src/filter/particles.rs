@@ -56,6 +56,7 @@ struct Candidate {
 }
 
 impl Candidate {
+    const NONE: Self = Self { ln_weight: 0, consistency_mm: 0 };
     const IMPOSSIBLE: Self = Self { ln_weight: i32::MIN, consistency_mm: u16::MAX };
 }
 
@@ -87,8 +88,8 @@ impl<const N: usize, const V: usize> Particles<N, V> {
             current: false,
             distinct: 0,
             best: 0,
-            wanted: 1,
-            pool: [[Candidate::IMPOSSIBLE; V]; N],
+            wanted: 0,
+            pool: [[Candidate::NONE; V]; N],
             predicted: Map::new(),
             likelihood: Likelihood::new(),
         }
