@@ -58,3 +58,31 @@ pub fn distance<'a>(alpha: impl Iterator<Item = &'a f64>, beta: impl Iterator<It
 pub fn is_consistent(a: &NgramSet, b: &NgramSet) -> bool {
     a == b
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn set(ngrams: &[&[f64]]) -> NgramSet {
+        ngrams.iter().map(|labels| Ngram::new(labels)).collect()
+    }
+
+    #[test]
+    fn each_half_is_the_worst_of_the_closest() {
+        let map = set(&[&[1.0, 2.0], &[10.0, 20.0]]);
+        let history = set(&[&[2.0, 2.0], &[19.0, 13.0], &[50.0, 50.0]]);
+        // (10, 20) and the reversal of (19, 13) are 3 apart; (50, 50) is 40 from (10, 20).
+        let expected = Hausdorff { map_to_history: 3.0, history_to_map: 40.0, comparisons: 12 };
+        assert_eq!(hausdorff(&map, &history), expected);
+        assert_eq!(expected.two_sided(), 40.0);
+    }
+
+    #[test]
+    fn empty_sets_agree_and_are_infinitely_far_from_others() {
+        let some = set(&[&[1.0, 2.0]]);
+        assert_eq!(hausdorff(&set(&[]), &set(&[])).two_sided(), 0.0);
+        assert_eq!(hausdorff(&some, &set(&[])).map_to_history, f64::INFINITY);
+        assert_eq!(hausdorff(&some, &set(&[])).history_to_map, 0.0);
+        assert_eq!(hausdorff(&set(&[]), &some).history_to_map, f64::INFINITY);
+    }
+}

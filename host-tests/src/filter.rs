@@ -260,3 +260,59 @@ pub fn resample(pool: &[Candidate], drawn: &[usize]) -> Vec<Particle> {
     };
     in_order.into_iter().map(particle).collect()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const PARAMETERS: Parameters = Parameters {
+        n: 3,
+        particles: 4,
+        phi: 0.5,
+        sigma_label_mm: 100.0,
+        sigma_consistency_mm: 50.0,
+        direction: Direction::TwoSided,
+        label_grid_mm: None,
+        ngram_grid_mm: None,
+        farthest_mm: f64::INFINITY,
+        most_vertices: usize::MAX,
+    };
+
+    #[test]
+    fn likelihoods_fall_to_one_over_e_at_one_sigma() {
+        assert_eq!(ln_observation_likelihood(1100.0, 1000.0, &PARAMETERS), -1.0);
+        let distance = Hausdorff { map_to_history: 50.0, history_to_map: 100.0, comparisons: 0 };
+        assert_eq!(ln_consistency_likelihood(distance, &PARAMETERS), -4.0);
+        let directed = Parameters { direction: Direction::MapToHistory, ..PARAMETERS };
+        assert_eq!(ln_consistency_likelihood(distance, &directed), -1.0);
+    }
+
+    #[test]
+    fn the_penalty_counts_every_vertex_once_and_every_pair_twice() {
+        let expected = 2.0 * 0.5_f64.ln() + 2.0 * (1.0 - 0.5 * (-1_f64).exp()).ln();
+        assert!((ln_penalty(&[1000.0, 1100.0], &PARAMETERS) - expected).abs() < 1e-12);
+    }
+
+    #[test]
+    fn two_places_in_turn_become_two_vertices_joined_by_an_edge() {
+        let mut particles = first_particles(&PARAMETERS);
+        let history_mm = [1000.0, 2000.0, 1010.0];
+        for (newest, observation_mm) in history_mm.into_iter().enumerate() {
+            let evidence = PARAMETERS.grams_of_history(&history_mm[..=newest]);
+            let pool = predict(&particles, observation_mm, &evidence, &PARAMETERS);
+            let weights = normalised_weights(&pool);
+            assert!((weights.iter().sum::<f64>() - 1.0).abs() < 1e-12);
+            particles = resample(&pool, &drawn(&weights, &[0.5; 4]));
+        }
+        let [particle] = &particles[..] else { panic!("all draws are the same") };
+        assert_eq!((particle.place, particle.multiplicity), (Some(0), 4));
+        assert_eq!(particle.map.graph, Graph::with(&[1005.0, 2000.0], &[(0, 1)]));
+    }
+
+    #[test]
+    fn a_label_on_a_grid_is_rounded_half_up() {
+        let on_grid = Parameters { label_grid_mm: Some(2.0), ..PARAMETERS };
+        assert_eq!(on_grid.mean_label(1000.0 + 1002.0, 2), 1002.0);
+        assert_eq!(on_grid.mean_label(1000.0 + 1000.0 + 1002.0, 3), 1000.0);
+    }
+}

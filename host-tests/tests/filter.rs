@@ -3,8 +3,9 @@
 
 mod common;
 
-use common::drive::{Drive, Evidence, Random, Tally};
-use toposlam::{Config, Direction};
+use common::drive::{Drive, Evidence, Random, Tally, VERTICES};
+use common::fingerprint;
+use toposlam::{Config, Direction, FaultKind, PaperFilter};
 
 const DIRECTIONS: [Direction; 3] = [Direction::TwoSided, Direction::MapToHistory, Direction::HistoryToMap];
 
@@ -90,4 +91,84 @@ fn an_empty_prior_leaves_the_choice_to_the_other_factors() {
             drive.observe(observation_mm, &mut random);
         }
     }
+}
+
+#[test]
+fn long_n_grams_with_coarse_labels_agree() {
+    for seed in 0..40 {
+        let mut random = Random(seed);
+        let config = Config {
+            ngram_length: 6 + random.below(2) as u8,
+            particles: 5,
+            direction: DIRECTIONS[seed as usize % 3],
+            ..Config::DEFAULT
+        };
+        let building = random.building(3);
+        let evidence =
+            if random.below(2) == 0 { Evidence::OnLine } else { Evidence::Prior(random.walk(&building, 8, 3)) };
+        let mut drive = Drive::new(config, &evidence);
+        for observation_mm in random.walk(&building, 8, 3) {
+            drive.observe(observation_mm, &mut random);
+        }
+    }
+}
+
+#[test]
+fn a_drive_longer_than_the_history_agrees_and_counts_what_was_dropped() {
+    for (seed, direction) in (0..).zip(DIRECTIONS) {
+        let mut random = Random(seed);
+        let mut drive = Drive::new(Config { ngram_length: 3, direction, ..Config::DEFAULT }, &Evidence::OnLine);
+        let building = random.building(4);
+        for observation_mm in random.walk(&building, 45, 3) {
+            drive.observe(observation_mm, &mut random);
+        }
+        assert_eq!(drive.faults(FaultKind::HistoryFull), 45 - 32);
+    }
+}
+
+#[test]
+fn a_map_without_room_for_a_new_vertex_is_reported_and_goes_on_with_what_it_has() {
+    for (seed, direction) in (0..).zip(DIRECTIONS) {
+        let mut random = Random(seed);
+        let config = Config { ngram_length: 2, penalty_permille: 0, sigma_label_mm: 20, direction, ..Config::DEFAULT };
+        let mut drive = Drive::new(config, &Evidence::OnLine);
+        for place in 0..VERTICES + 4 {
+            assert_eq!(drive.faults(FaultKind::VerticesFull), place.saturating_sub(VERTICES) as u32);
+            drive.observe(1000.0 + 200.0 * place as f64, &mut random);
+        }
+        assert!(drive.sizes().iter().all(|&size| usize::from(size) == VERTICES));
+    }
+}
+
+#[test]
+fn a_map_of_one_vertex_pays_one_minus_phi_because_eq_9_includes_a_equal_b() {
+    for penalty_permille in [0_u16, 1, 100, 500, 999] {
+        let mut filter = PaperFilter::<1, 4, 1>::new();
+        filter.start(Config { penalty_permille, particles: 1, ..Config::DEFAULT }, 0).unwrap();
+        filter.observe(fingerprint(1200.0));
+        let phi = f64::from(penalty_permille) / 1000.0;
+        let of_core = f64::from(filter.best().factors.ln_size_q16) / 65536.0;
+        assert!((of_core - (1.0 - phi).ln()).abs() < 1e-4, "{of_core} {phi}");
+    }
+}
+
+/// Everything a filter tells about a drive of 40 places.
+fn told(filter: &mut PaperFilter<10, 16, 4>, seed: u64) -> Vec<String> {
+    filter.start(Config { ngram_length: 4, ..Config::DEFAULT }, seed).unwrap();
+    let mut random = Random(7);
+    let building = random.building(5);
+    let mut observe = |observation_mm| {
+        let update = filter.observe(fingerprint(observation_mm));
+        format!("{update:?} {:?}", filter.particles())
+    };
+    random.walk(&building, 40, 15).into_iter().map(&mut observe).collect()
+}
+
+#[test]
+fn the_same_seed_gives_the_same_drive_and_another_seed_another() {
+    let mut filter = Box::new(PaperFilter::new());
+    let first = told(&mut filter, 1);
+    assert_eq!(first, told(&mut filter, 1), "a filter that is started again forgets what it was");
+    assert_eq!(first, told(&mut Box::new(PaperFilter::new()), 1));
+    assert_ne!(first, told(&mut filter, 2));
 }

@@ -1,7 +1,7 @@
 //! A core filter and the reference filter side by side, on the same observations and the same random draws.
 
 use super::{fingerprint, length};
-use toposlam::{Config, Direction, Fingerprint, PaperFilter, Particle as CoreParticle, Prior, Update};
+use toposlam::{Config, Direction, FaultKind, Fingerprint, PaperFilter, Particle as CoreParticle, Prior, Update};
 use toposlam_host_tests::filter::{self, Candidate, Map, Parameters, Particle};
 use toposlam_host_tests::graph::Graph;
 use toposlam_host_tests::ngram::NgramSet;
@@ -162,6 +162,16 @@ impl Drive {
         self.check_update(&pool, &chosen, update);
         self.particles = filter::resample(&pool, &chosen);
         self.check_particles(&pool);
+    }
+
+    /// How often the core met a fault of a kind.
+    pub fn faults(&self, kind: FaultKind) -> u32 {
+        self.core.faults().of(kind)
+    }
+
+    /// The numbers of vertices of the core's maps.
+    pub fn sizes(&self) -> Vec<u8> {
+        self.core.particles().iter().map(|particle| particle.map.vertices()).collect()
     }
 
     /// The candidates that the core drew, in the order of the pool.
