@@ -154,7 +154,7 @@ impl core::fmt::Display for VerticesFull {
 impl core::error::Error for VerticesFull {}
 
 /// The numbers of the bits that are set in a row, ascending.
-pub(crate) fn bits(mut row: u64) -> impl Iterator<Item = u8> {
+pub(crate) fn bits(mut row: u64) -> impl Iterator<Item = u8> + Clone {
     core::iter::from_fn(move || {
         if row == 0 {
             return None;

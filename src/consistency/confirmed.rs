@@ -1,21 +1,44 @@
 //! From the map to the evidence: is every walk of the map near some n-gram of the evidence?
+//!
+//! A walk of `n` vertices is two *arms* of `⌈n/2⌉` vertices that meet: at one vertex when `n` is odd, over an edge when it
+//! is even. It is confirmed when the states that either arm may have been read to meet as well. Of the arms that end at a
+//! vertex only those with minimal sets of states matter: what meets a set meets all that it lies within.
 
 use super::{Consistency, evidence::Evidence, readings::Readings, state_set::StateSet};
 use crate::{Map, NgramLength, map::bits};
 
-/// How many arms are held at once.
-pub(super) const BLOCK: usize = 16;
+/// How many arms are held at once; more are taken in blocks.
+const BLOCK: usize = 16;
 
-/// The longest arm: the half of the longest n-gram, its middle included.
-const LONGEST_ARM: usize = 4;
+/// How many minimal tails of a vertex are kept; the tails of a vertex with more are read anew each time.
+const TAILS: usize = 4;
+
+/// The scratch memory of one question: arms and tails as sets of states.
+#[derive(Clone, Debug)]
+pub(super) struct Arms<const V: usize, const WORDS: usize> {
+    block: [StateSet<WORDS>; BLOCK],
+    /// For each vertex, where the readings of a tail that ends there may go on to: the minimal sets.
+    tails: [[StateSet<WORDS>; TAILS]; V],
+    /// For each vertex, the tails it has: bits of kept ones, [`UNREAD`], or [`TOO_MANY`].
+    kept: [u8; V],
+}
+
+/// The tails of a vertex were not asked for yet.
+const UNREAD: u8 = 0;
+/// A vertex has more minimal tails than are kept.
+const TOO_MANY: u8 = 1 << TAILS;
+
+impl<const V: usize, const WORDS: usize> Arms<V, WORDS> {
+    pub(super) const fn new() -> Self {
+        Self { block: [StateSet::EMPTY; BLOCK], tails: [[StateSet::EMPTY; TAILS]; V], kept: [UNREAD; V] }
+    }
+}
 
 impl<const V: usize, const WORDS: usize, const INDICES: usize> Consistency<V, WORDS, INDICES> {
     /// Whether max over the map's walks of min over the evidence of Eq. 3 is at most `distance`.
     ///
-    /// A walk of `n` vertices is two arms of `⌈n/2⌉` vertices that meet: at one vertex when `n` is odd, over an edge
-    /// when it is even. It is confirmed when the states that either arm may have been read to meet as well. Arms are
-    /// few where walks are many. Cost: O(V · A² · WORDS) with A arms a vertex, A ≤ Δ^(⌈n/2⌉−1) for a largest degree of Δ;
-    /// memory: a block of 16 arms, whatever A is.
+    /// Cost: O(V · A² · WORDS) with A minimal arms a vertex, A ≤ Δ^(⌈n/2⌉−1) for a largest degree of Δ; memory: a block
+    /// of 16 arms and 4 tails a vertex, whatever A is.
     pub(super) fn confirms(
         &mut self,
         map: &Map<V>,
@@ -23,133 +46,187 @@ impl<const V: usize, const WORDS: usize, const INDICES: usize> Consistency<V, WO
         length: NgramLength,
         distance: u16,
     ) -> bool {
-        let suspect = if self.suspect < map.vertices() { self.suspect } else { 0 };
-        for vertex in (suspect..map.vertices()).chain(0..suspect) {
-            if !self.confirms_at(map, evidence, length, distance, vertex) {
-                self.suspect = vertex;
+        let Self { readings, arms: Arms { block, tails, kept }, suspect, .. } = self;
+        kept.fill(UNREAD);
+        let mut question = Question { map, evidence, length, distance, readings, tails, kept };
+        // The vertex whose walks were refuted last is the first to ask.
+        let first = if *suspect < map.vertices() { *suspect } else { 0 };
+        for vertex in (first..map.vertices()).chain(0..first) {
+            if !question.confirms_at(vertex, block) {
+                *suspect = vertex;
                 return false;
             }
         }
         true
     }
-
-    /// Whether all walks whose middle is a vertex, or an edge from it to a vertex of no smaller number, are confirmed.
-    fn confirms_at(
-        &mut self,
-        map: &Map<V>,
-        evidence: &impl Evidence<WORDS>,
-        length: NgramLength,
-        distance: u16,
-        vertex: u8,
-    ) -> bool {
-        let block = &mut self.arms;
-        let mut question = Question { map, evidence, length, distance, readings: &mut self.readings };
-        let odd = length.get() % 2 == 1;
-        let mut arms = Arms::from(map, length, vertex);
-        loop {
-            let mut held = 0;
-            for slot in block.iter_mut() {
-                let Some(arm) = arms.next(map) else { break };
-                *slot = question.states(&arm, arms.vertices);
-                held += 1;
-            }
-            let block = block.get(..held).unwrap_or(&[]);
-            if block.is_empty() {
-                return true;
-            }
-            let confirmed = if odd {
-                let pairs = block.iter().enumerate();
-                pairs
-                    .into_iter()
-                    .all(|(index, arm)| block.iter().take(index + 1).all(|other| evidence.meets(length, arm, other)))
-                    && question.all_meet(block, arms.clone())
-            } else {
-                bits(map.neighbours(vertex) >> vertex << vertex)
-                    .all(|neighbour| question.all_meet(block, Arms::from(map, length, neighbour)))
-            };
-            if !confirmed {
-                return false;
-            }
-        }
-    }
 }
 
-/// What the arms are held against.
+/// A map and a distance held against evidence.
 struct Question<'a, E, const V: usize, const WORDS: usize, const INDICES: usize> {
     map: &'a Map<V>,
     evidence: &'a E,
     length: NgramLength,
     distance: u16,
     readings: &'a mut Readings<V, WORDS, INDICES>,
+    tails: &'a mut [[StateSet<WORDS>; TAILS]; V],
+    kept: &'a mut [u8; V],
 }
 
 impl<E: Evidence<WORDS>, const V: usize, const WORDS: usize, const INDICES: usize> Question<'_, E, V, WORDS, INDICES> {
-    /// The states that the evidence may have been read to along an arm, from its far end to the middle of the walk.
-    fn states(&mut self, arm: &[u8; LONGEST_ARM], vertices: u8) -> StateSet<WORDS> {
-        let mut states = StateSet::EMPTY;
-        for (index, &vertex) in (0..vertices).zip(arm.iter().take(usize::from(vertices)).rev()) {
-            let label = (vertex, self.map.label_of(vertex));
-            let reading = self.readings.at(self.evidence, self.length, label, index, self.distance);
-            states = if index == 0 { *reading } else { self.evidence.around(&states).intersection(reading) };
+    /// Whether all walks whose middle is a vertex, or an edge from it to a vertex of no smaller number, are confirmed.
+    fn confirms_at(&mut self, vertex: u8, block: &mut [StateSet<WORDS>; BLOCK]) -> bool {
+        let mut onward = bits(self.map.neighbours(vertex) >> vertex << vertex);
+        if self.length == NgramLength::MIN {
+            let states = *self.reading(vertex, 0);
+            return onward.all(|neighbour| self.evidence.meets(self.length, &states, self.reading(neighbour, 0)));
         }
-        states
-    }
-
-    /// Whether each of a block of arms meets all of some other arms.
-    fn all_meet(&mut self, block: &[StateSet<WORDS>], mut others: Arms) -> bool {
-        while let Some(arm) = others.next(self.map) {
-            let states = self.states(&arm, others.vertices);
-            if !block.iter().all(|held| self.evidence.meets(self.length, held, &states)) {
+        let odd = self.length.get() % 2 == 1;
+        let mut ways = self.ways(vertex);
+        let mut arm = self.next_arm(&mut ways);
+        while arm.is_some() {
+            let mut held = 0;
+            while let Some(states) = arm {
+                let Some(now_held) = states.insert_minimal(block, held) else { break };
+                held = now_held;
+                arm = self.next_arm(&mut ways);
+            }
+            let block = block.get(..held).unwrap_or(&[]);
+            let confirmed = if odd {
+                let mut ends = 1..;
+                let pairs = block.iter().zip(&mut ends);
+                pairs.into_iter().all(|(first, end)| block.iter().take(end).all(|other| self.meet(first, other)))
+                    && arm.is_none_or(|arm| block.iter().all(|other| self.meet(&arm, other)))
+                    && self.all_meet(block, ways.clone())
+            } else {
+                onward.clone().all(|neighbour| self.all_meet(block, self.ways(neighbour)))
+            };
+            if !confirmed {
                 return false;
             }
         }
         true
     }
-}
 
-/// All walks that start at a vertex and have half the length of an n-gram, in a fixed order.
-#[derive(Clone)]
-struct Arms {
-    /// The vertices of the current arm, the middle of the walk first.
-    path: [u8; LONGEST_ARM],
-    /// For every vertex of the arm but the first, its brothers that are still to come.
-    waiting: [u64; LONGEST_ARM],
-    /// How many vertices an arm has: 1 to 4.
-    vertices: u8,
-    /// How many vertices of the path stand.
-    depth: u8,
-}
-
-impl Arms {
-    fn from<const V: usize>(map: &Map<V>, length: NgramLength, vertex: u8) -> Self {
-        let vertices = length.get().div_ceil(2);
-        let mut waiting = [0; LONGEST_ARM];
-        waiting[1] = map.neighbours(vertex);
-        Self { path: [vertex, 0, 0, 0], waiting, vertices, depth: 1 }
+    fn meet(&self, first: &StateSet<WORDS>, second: &StateSet<WORDS>) -> bool {
+        self.evidence.meets(self.length, first, second)
     }
 
-    fn next<const V: usize>(&mut self, map: &Map<V>) -> Option<[u8; LONGEST_ARM]> {
-        if self.vertices == 1 {
-            // An arm of one vertex is the vertex itself, once, and only where a walk can go on from it.
-            let alone = self.depth == 1 && self.waiting[1] != 0;
-            self.depth = 0;
-            return alone.then_some(self.path);
+    /// Whether all arms along the ways that are still to come meet each of a block.
+    fn all_meet(&mut self, block: &[StateSet<WORDS>], mut ways: Ways) -> bool {
+        while let Some(arm) = self.next_arm(&mut ways) {
+            if !block.iter().all(|other| self.meet(&arm, other)) {
+                return false;
+            }
         }
+        true
+    }
+
+    /// The ways from the middle of a walk to where the tails of its arms begin.
+    fn ways(&self, middle: u8) -> Ways {
+        let vertices = if self.length.get() > 6 { 3 } else { 2 };
+        Ways { path: [middle, 0, 0], waiting: [0, self.map.neighbours(middle), 0], vertices, tails: 0 }
+    }
+
+    /// The states that the evidence may have been read to along the next arm, from its far end to the middle.
+    fn next_arm(&mut self, ways: &mut Ways) -> Option<StateSet<WORDS>> {
+        while ways.tails == 0 {
+            let end = ways.next(self.map)?;
+            ways.tails = self.tails_at(end);
+        }
+        let tail = ways.tails.trailing_zeros() as u8;
+        ways.tails &= ways.tails - 1;
+        let [middle, between, far] = ways.path;
+        if ways.vertices == 2 {
+            let states = self.tail(between, tail);
+            return Some(states.intersection(self.reading(middle, self.tail_labels())));
+        }
+        let states = self.tail(far, tail).intersection(self.reading(between, self.tail_labels()));
+        Some(self.evidence.around(&states).intersection(self.reading(middle, self.tail_labels() + 1)))
+    }
+
+    /// How many labels a tail has: two, but only the last one where an arm has no more than two.
+    fn tail_labels(&self) -> u8 {
+        if self.length.get() > 4 { 2 } else { 1 }
+    }
+
+    /// The tails of a vertex, as a row of numbers for [`Question::tail`].
+    fn tails_at(&mut self, vertex: u8) -> u64 {
+        let slot = usize::from(vertex);
+        let row = if self.tail_labels() == 1 { 1 } else { self.map.neighbours(vertex) };
+        if self.kept.get(slot) == Some(&UNREAD) {
+            let mut held = Some(0);
+            for number in bits(row) {
+                let tail = self.read_tail(vertex, number);
+                held = match (held, self.tails.get_mut(slot)) {
+                    (Some(held), Some(tails)) => tail.insert_minimal(tails, held),
+                    _ => break,
+                };
+            }
+            if let Some(kept) = self.kept.get_mut(slot) {
+                *kept = held.map_or(TOO_MANY, |held| (1 << held) - 1);
+            }
+        }
+        match self.kept.get(slot) {
+            Some(&kept) if kept != TOO_MANY => u64::from(kept),
+            _ => row,
+        }
+    }
+
+    fn tail(&mut self, vertex: u8, number: u8) -> StateSet<WORDS> {
+        let slot = usize::from(vertex);
+        if self.kept.get(slot) == Some(&TOO_MANY) {
+            return self.read_tail(vertex, number);
+        }
+        self.tails.get(slot).and_then(|tails| tails.get(usize::from(number))).copied().unwrap_or(StateSet::EMPTY)
+    }
+
+    /// Where the reading of a tail may go on to: a tail of two labels begins at the neighbour with a number.
+    fn read_tail(&mut self, vertex: u8, number: u8) -> StateSet<WORDS> {
+        if self.tail_labels() == 1 {
+            let states = *self.reading(vertex, 0);
+            return self.evidence.around(&states);
+        }
+        let states = *self.reading(number, 0);
+        let states = self.evidence.around(&states).intersection(self.reading(vertex, 1));
+        self.evidence.around(&states)
+    }
+
+    fn reading(&mut self, vertex: u8, index: u8) -> &StateSet<WORDS> {
+        let label = (vertex, self.map.label_of(vertex));
+        self.readings.at(self.evidence, self.length, label, index, self.distance)
+    }
+}
+
+/// All walks of two or three vertices that start at a vertex, in a fixed order, and the tails at the end of the current.
+#[derive(Clone)]
+struct Ways {
+    path: [u8; 3],
+    /// For every vertex of the path but the first, its brothers that are still to come.
+    waiting: [u64; 3],
+    vertices: u8,
+    /// The tails at the end of the current walk that are still to come.
+    tails: u64,
+}
+
+impl Ways {
+    /// Goes to the next walk; returns its last vertex.
+    fn next<const V: usize>(&mut self, map: &Map<V>) -> Option<u8> {
         loop {
-            let depth = usize::from(self.depth);
-            let waiting = self.waiting.get_mut(depth)?;
-            if *waiting == 0 {
-                self.depth = self.depth.checked_sub(1).filter(|&depth| depth > 0)?;
-                continue;
+            let [_, first, second] = &mut self.waiting;
+            if self.vertices == 3 && *second != 0 {
+                self.path[2] = second.trailing_zeros() as u8;
+                *second &= *second - 1;
+                return Some(self.path[2]);
             }
-            let vertex = waiting.trailing_zeros() as u8;
-            *waiting &= *waiting - 1;
-            *self.path.get_mut(depth)? = vertex;
-            if self.depth + 1 == self.vertices {
-                return Some(self.path);
+            if *first == 0 {
+                return None;
             }
-            self.depth += 1;
-            *self.waiting.get_mut(depth + 1)? = map.neighbours(vertex);
+            self.path[1] = first.trailing_zeros() as u8;
+            *first &= *first - 1;
+            if self.vertices == 2 {
+                return Some(self.path[1]);
+            }
+            *second = map.neighbours(self.path[1]);
         }
     }
 }

@@ -37,8 +37,7 @@ pub struct Consistency<const V: usize, const WORDS: usize, const INDICES: usize>
     readings: Readings<V, WORDS, INDICES>,
     /// Where straight readings of the evidence have got to at each vertex; two rows, used in turn.
     reached: [[StateSet<WORDS>; V]; 2],
-    /// One block of the readings that end at a vertex.
-    arms: [StateSet<WORDS>; confirmed::BLOCK],
+    arms: confirmed::Arms<V, WORDS>,
     /// The vertex whose walks were refuted last: the first to ask the next time.
     suspect: u8,
 }
@@ -46,12 +45,7 @@ pub struct Consistency<const V: usize, const WORDS: usize, const INDICES: usize>
 impl<const V: usize, const WORDS: usize, const INDICES: usize> Consistency<V, WORDS, INDICES> {
     /// Scratch memory that holds nothing yet.
     pub const fn new() -> Self {
-        Self {
-            readings: Readings::new(),
-            reached: [[StateSet::EMPTY; V]; 2],
-            arms: [StateSet::EMPTY; confirmed::BLOCK],
-            suspect: 0,
-        }
+        Self { readings: Readings::new(), reached: [[StateSet::EMPTY; V]; 2], arms: confirmed::Arms::new(), suspect: 0 }
     }
 
     /// The distance of Eq. 2, or one directed half of it, in units of [`NgramLength::label_step_mm`].

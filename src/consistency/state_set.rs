@@ -44,6 +44,25 @@ impl<const WORDS: usize> StateSet<WORDS> {
         self.0.iter().zip(other.0).all(|(word, wanted)| wanted & !word == 0)
     }
 
+    /// Adds this set to a list of minimal sets, unless one of them lies within it; those that it lies within leave.
+    /// The number of sets in the list is returned, or `None` when there is no room, with nothing changed.
+    pub(super) fn insert_minimal(&self, sets: &mut [Self], held: usize) -> Option<usize> {
+        let mut kept = 0;
+        for index in 0..held {
+            let set = *sets.get(index)?;
+            if self.contains_all(&set) {
+                // Nothing left the list before: what lies within this set would have lain within that one.
+                return Some(held);
+            }
+            if !set.contains_all(self) {
+                *sets.get_mut(kept)? = set;
+                kept += 1;
+            }
+        }
+        *sets.get_mut(kept)? = *self;
+        Some(kept + 1)
+    }
+
     /// Every state moved to the next number; the last one becomes the first.
     pub(super) fn rotated_up(&self) -> Self {
         let mut moved = *self;
@@ -92,5 +111,17 @@ mod tests {
         assert_eq!(set(&[0, 31, 63]).rotated_up(), set(&[1, 32, 0]));
         assert_eq!(set(&[0, 32, 63]).rotated_down(), set(&[63, 31, 62]));
         assert_eq!(set(&[1, 33]).halves_swapped(), set(&[33, 1]));
+    }
+
+    #[test]
+    fn only_minimal_sets_are_held() {
+        let mut sets = [StateSet::EMPTY; 2];
+        let mut held = set(&[1, 2, 3]).insert_minimal(&mut sets, 0).unwrap();
+        held = set(&[4, 5]).insert_minimal(&mut sets, held).unwrap();
+        assert_eq!(set(&[1, 2]).insert_minimal(&mut sets, held), Some(2), "replaces the first");
+        assert_eq!(set(&[4, 5, 6]).insert_minimal(&mut sets, held), Some(2), "holds the second");
+        assert!(sets.contains(&set(&[1, 2])) && sets.contains(&set(&[4, 5])));
+        assert_eq!(set(&[7]).insert_minimal(&mut sets, held), None, "no room");
+        assert_eq!(set(&[]).insert_minimal(&mut sets, held), Some(1), "the empty set lies within all");
     }
 }
