@@ -2,7 +2,7 @@
 
 mod common;
 
-use common::random::{cases, graph, graph_and_history, graph_and_its_history, sequences};
+use common::random::{cases, dense_graph_and_its_history, graph, graph_and_history, graph_and_its_history, sequences};
 use common::{
     HISTORY_WORDS, TABLE_WORDS, core_distances_mm, core_history, core_table_of_history, fingerprint, in_ngram_mm,
     length, ngrams_of, reference_distances_mm,
@@ -46,6 +46,14 @@ proptest! {
 
 proptest! {
     #![proptest_config(cases(300))]
+
+    #[test]
+    fn distances_equal_the_enumeration_where_ways_are_many(
+        (graph, history) in dense_graph_and_its_history(80),
+        n in 4_usize..=5,
+    ) {
+        agrees(&graph, &history, n)?;
+    }
 
     #[test]
     fn distances_equal_the_enumeration_for_coarse_labels((graph, history) in graph_and_history(14), n in 6_usize..=7) {

@@ -37,10 +37,19 @@ pub fn graph() -> impl Strategy<Value = Graph> {
     })
 }
 
-/// A graph, and a history that is a noisy walk on it: it starts anew at any vertex where it cannot go on.
-pub fn graph_and_its_history(longest: usize) -> impl Strategy<Value = (Graph, Vec<f64>)> {
+/// A graph with so many edges that a place has dozens of ways on.
+fn dense_graph() -> impl Strategy<Value = Graph> {
+    let indices = || any::<prop::sample::Index>();
+    (vec(label(), 5..=8), vec((indices(), indices()), 12..=24)).prop_map(|(labels, edges)| {
+        let edges: Vec<_> = edges.iter().map(|(a, b)| (a.index(labels.len()), b.index(labels.len()))).collect();
+        Graph::with(&labels, &edges)
+    })
+}
+
+/// A noisy walk on a graph: it starts anew at any vertex where it cannot go on.
+fn walk_on(graph: impl Strategy<Value = Graph>, longest: usize) -> impl Strategy<Value = (Graph, Vec<f64>)> {
     let noise_mm = prop_oneof![Just(0.0), (-10_i16..=10).prop_map(|steps| 2.0 * f64::from(steps))];
-    (graph(), vec((any::<prop::sample::Index>(), noise_mm), 0..=longest)).prop_map(|(graph, steps)| {
+    (graph, vec((any::<prop::sample::Index>(), noise_mm), 0..=longest)).prop_map(|(graph, steps)| {
         let mut place: Option<usize> = None;
         let mut history = Vec::new();
         for (choice, noise_mm) in steps {
@@ -57,6 +66,16 @@ pub fn graph_and_its_history(longest: usize) -> impl Strategy<Value = (Graph, Ve
         }
         (graph, history)
     })
+}
+
+/// A graph and a noisy walk on it.
+pub fn graph_and_its_history(longest: usize) -> impl Strategy<Value = (Graph, Vec<f64>)> {
+    walk_on(graph(), longest)
+}
+
+/// A graph whose places have dozens of ways on, and a noisy walk on it.
+pub fn dense_graph_and_its_history(longest: usize) -> impl Strategy<Value = (Graph, Vec<f64>)> {
+    walk_on(dense_graph(), longest)
 }
 
 /// A history of arbitrary labels.
