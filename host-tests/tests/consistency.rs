@@ -2,7 +2,10 @@
 
 mod common;
 
-use common::random::{cases, dense_graph_and_its_history, graph, graph_and_history, graph_and_its_history, sequences};
+use common::random::{
+    cases, dense_graph_and_its_history, graph, graph_and_history, graph_and_its_history, graph_and_what_is_missing,
+    sequences,
+};
 use common::{
     HISTORY_WORDS, TABLE_WORDS, core_distances_mm, core_history, core_table_of_history, fingerprint, in_ngram_mm,
     length, ngrams_of, reference_distances_mm,
@@ -12,6 +15,9 @@ use toposlam::{Ngram, NgramTable};
 use toposlam_host_tests::consistency::hausdorff;
 use toposlam_host_tests::graph::Graph;
 use toposlam_host_tests::ngram::{grams_of_graph, grams_of_history};
+
+/// Words of a table that holds every n-gram of the densest graph here.
+const EXPLORED_WORDS: usize = 512;
 
 /// The reference's Eq. 2 of a graph and a history, labels as coarse as the n-grams of this length.
 fn enumerated_mm(graph: &Graph, history_mm: &[f64], n: usize) -> [f64; 3] {
@@ -53,6 +59,27 @@ proptest! {
         n in 4_usize..=5,
     ) {
         agrees(&graph, &history, n)?;
+    }
+
+    #[test]
+    fn n_grams_missing_from_a_complete_exploration_are_found(
+        (graph, missing) in graph_and_what_is_missing(),
+        n in 3_usize..=5,
+    ) {
+        let of_graph = grams_of_graph(&graph, n);
+        let mut explored: Vec<_> = of_graph.iter().cloned().collect();
+        for index in missing {
+            if !explored.is_empty() {
+                explored.swap_remove(index.index(explored.len()));
+            }
+        }
+        let mut table = Box::new(NgramTable::<EXPLORED_WORDS>::new(length(n)));
+        for ngram in &explored {
+            let fingerprints: Vec<_> = ngram.labels().iter().map(|&label_mm| fingerprint(label_mm)).collect();
+            table.insert(Ngram::new(length(n), &fingerprints).unwrap()).unwrap();
+        }
+        let enumerated = hausdorff(&of_graph, &explored.into_iter().collect());
+        prop_assert_eq!(core_distances_mm::<_, 7>(&graph, &*table, n), reference_distances_mm(enumerated));
     }
 
     #[test]
