@@ -62,27 +62,6 @@ proptest! {
     }
 
     #[test]
-    fn n_grams_missing_from_a_complete_exploration_are_found(
-        (graph, missing) in graph_and_what_is_missing(),
-        n in 3_usize..=5,
-    ) {
-        let of_graph = grams_of_graph(&graph, n);
-        let mut explored: Vec<_> = of_graph.iter().cloned().collect();
-        for index in missing {
-            if !explored.is_empty() {
-                explored.swap_remove(index.index(explored.len()));
-            }
-        }
-        let mut table = Box::new(NgramTable::<EXPLORED_WORDS>::new(length(n)));
-        for ngram in &explored {
-            let fingerprints: Vec<_> = ngram.labels().iter().map(|&label_mm| fingerprint(label_mm)).collect();
-            table.insert(Ngram::new(length(n), &fingerprints).unwrap()).unwrap();
-        }
-        let enumerated = hausdorff(&of_graph, &explored.into_iter().collect());
-        prop_assert_eq!(core_distances_mm::<_, 7>(&graph, &*table, n), reference_distances_mm(enumerated));
-    }
-
-    #[test]
     fn distances_equal_the_enumeration_for_coarse_labels((graph, history) in graph_and_history(14), n in 6_usize..=7) {
         agrees(&graph, &history, n)?;
     }
@@ -115,5 +94,30 @@ proptest! {
         }
         let enumerated = hausdorff(&grams_of_graph(&graph, n), &ngrams_of(&table));
         prop_assert_eq!(core_distances_mm::<_, 7>(&graph, &table, n), reference_distances_mm(enumerated));
+    }
+}
+
+proptest! {
+    #![proptest_config(cases(400))]
+
+    #[test]
+    fn n_grams_missing_from_a_complete_exploration_are_found(
+        (graph, missing) in graph_and_what_is_missing(),
+        n in prop_oneof![1 => 3_usize..=4, 2 => Just(5)],
+    ) {
+        let of_graph = grams_of_graph(&graph, n);
+        let mut explored: Vec<_> = of_graph.iter().cloned().collect();
+        for index in missing {
+            if !explored.is_empty() {
+                explored.swap_remove(index.index(explored.len()));
+            }
+        }
+        let mut table = Box::new(NgramTable::<EXPLORED_WORDS>::new(length(n)));
+        for ngram in &explored {
+            let fingerprints: Vec<_> = ngram.labels().iter().map(|&label_mm| fingerprint(label_mm)).collect();
+            table.insert(Ngram::new(length(n), &fingerprints).unwrap()).unwrap();
+        }
+        let enumerated = hausdorff(&of_graph, &explored.into_iter().collect());
+        prop_assert_eq!(core_distances_mm::<_, 7>(&graph, &*table, n), reference_distances_mm(enumerated));
     }
 }

@@ -49,14 +49,14 @@ fn dense_graph() -> impl Strategy<Value = Graph> {
 /// A graph whose labels all differ, dense or with a hub, and which of its n-grams an exploration missed.
 pub fn graph_and_what_is_missing() -> impl Strategy<Value = (Graph, Vec<prop::sample::Index>)> {
     let indices = || any::<prop::sample::Index>();
-    let noise_steps = vec(0_u16..10, 5..=9);
-    let edges = vec((indices(), indices()), 4..=12);
+    let noise_steps = vec(0_u16..10, 5..=6);
+    let edges = vec((indices(), indices()), 8..=28);
     (noise_steps, edges, any::<bool>(), vec(indices(), 0..=2)).prop_map(|(noise_steps, edges, has_hub, missing)| {
         let label = |(vertex, noise): (usize, &u16)| label_mm(500 + 37 * (5 * vertex % 9) as u16 + noise);
         let labels: Vec<f64> = noise_steps.iter().enumerate().map(label).collect();
         let any_edges = edges.iter().map(|(a, b)| (a.index(labels.len()), b.index(labels.len())));
         let edges: Vec<_> = match has_hub {
-            true => (1..labels.len()).map(|leaf| (0, leaf)).chain(any_edges.take(3)).collect(),
+            true => (1..labels.len()).map(|leaf| (0, leaf)).chain(any_edges.take(6)).collect(),
             false => any_edges.collect(),
         };
         (Graph::with(&labels, &edges), missing)
