@@ -72,6 +72,11 @@ impl<const WORDS: usize> History<WORDS> {
     pub(crate) fn newest_slot(&self) -> usize {
         (self.pushed as usize).wrapping_sub(1) % Self::CAPACITY
     }
+
+    /// The slot behind the newest observation: that of the oldest one in a full ring, else a free one.
+    pub(crate) fn slot_behind_newest(&self) -> usize {
+        self.pushed as usize % Self::CAPACITY
+    }
 }
 
 impl<const WORDS: usize> Default for History<WORDS> {

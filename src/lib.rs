@@ -22,7 +22,10 @@ mod history;
 mod likelihood;
 mod map;
 mod ngram;
+pub mod place;
 pub mod ring;
+#[cfg(feature = "wire")]
+pub mod wire;
 
 pub use consistency::{Consistency, Direction, Evidence};
 pub use fault::{FaultCounters, FaultKind};

@@ -58,15 +58,17 @@ impl<const WORDS: usize> Readable<WORDS> for History<WORDS> {
     }
 
     fn around(&self, states: &StateSet<WORDS>) -> StateSet<WORDS> {
-        let mut back = states.rotated_down();
-        back.assign(self.newest_slot(), false);
-        back.insert_all(&self.onward(states));
-        back
+        let mut around = states.rotated_both_ways();
+        // The newest and the oldest position are no neighbours.
+        let (newest, oldest) = (self.newest_slot(), self.slot_behind_newest());
+        around.assign(newest, states.contains((newest + Self::CAPACITY - 1) % Self::CAPACITY));
+        around.assign(oldest, states.contains((oldest + 1) % Self::CAPACITY));
+        around
     }
 
     fn onward(&self, states: &StateSet<WORDS>) -> StateSet<WORDS> {
         let mut forth = states.rotated_up();
-        forth.assign((self.newest_slot() + 1) % Self::CAPACITY, false);
+        forth.assign(self.slot_behind_newest(), false);
         forth
     }
 

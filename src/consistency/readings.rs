@@ -14,12 +14,15 @@ struct Key {
 
 const NOTHING: Key = Key { label: Fingerprint::ZERO, above_distance: 0 };
 
-/// For every vertex and index, the two newest readings: one at an even distance and one at an odd distance, because
-/// the search asks about neighbouring distances in turn.
+/// How many readings are kept for a vertex and an index: one for each remainder of the distance, because the search asks
+/// about neighbouring distances in turn.
+const PLANES: usize = 4;
+
+/// The readings that were made last.
 #[derive(Clone, Debug)]
 pub(super) struct Readings<const V: usize, const WORDS: usize, const INDICES: usize> {
-    sets: [[[StateSet<WORDS>; V]; 2]; INDICES],
-    keys: [[[Key; V]; 2]; INDICES],
+    sets: [[[StateSet<WORDS>; V]; PLANES]; INDICES],
+    keys: [[[Key; V]; PLANES]; INDICES],
 }
 
 /// All steps of a fingerprint that lie within a distance of a label, the distance in units of the n-gram's steps.
@@ -32,7 +35,7 @@ fn range_steps(length: NgramLength, label: Fingerprint, distance: u16) -> (u16, 
 
 impl<const V: usize, const WORDS: usize, const INDICES: usize> Readings<V, WORDS, INDICES> {
     pub(super) const fn new() -> Self {
-        Self { sets: [[[StateSet::EMPTY; V]; 2]; INDICES], keys: [[[NOTHING; V]; 2]; INDICES] }
+        Self { sets: [[[StateSet::EMPTY; V]; PLANES]; INDICES], keys: [[[NOTHING; V]; PLANES]; INDICES] }
     }
 
     /// The states of the evidence whose label number `index` is within `distance` of the label of a vertex.
@@ -44,13 +47,13 @@ impl<const V: usize, const WORDS: usize, const INDICES: usize> Readings<V, WORDS
         index: u8,
         distance: u16,
     ) -> &StateSet<WORDS> {
-        let plane = if INDICES == 1 { 0 } else { usize::from(index) };
-        let parity = usize::from(distance & 1);
-        let (Some(sets), Some(keys)) = (self.sets.get_mut(plane), self.keys.get_mut(plane)) else {
+        let index_slot = if INDICES == 1 { 0 } else { usize::from(index) };
+        let plane = usize::from(distance) % PLANES;
+        let (Some(sets), Some(keys)) = (self.sets.get_mut(index_slot), self.keys.get_mut(index_slot)) else {
             return const { &StateSet::EMPTY };
         };
         let (Some(set), Some(key)) =
-            (sets[parity].get_mut(usize::from(vertex)), keys[parity].get_mut(usize::from(vertex)))
+            (sets[plane].get_mut(usize::from(vertex)), keys[plane].get_mut(usize::from(vertex)))
         else {
             return const { &StateSet::EMPTY };
         };

@@ -23,6 +23,10 @@ impl<const WORDS: usize> StateSet<WORDS> {
         }
     }
 
+    pub(super) fn contains(&self, state: usize) -> bool {
+        self.0.get(state / 32).is_some_and(|word| word >> (state % 32) & 1 == 1)
+    }
+
     pub(super) fn insert_all(&mut self, other: &Self) {
         for (word, more) in self.0.iter_mut().zip(other.0) {
             *word |= more;
@@ -65,24 +69,23 @@ impl<const WORDS: usize> StateSet<WORDS> {
 
     /// Every state moved to the next number; the last one becomes the first.
     pub(super) fn rotated_up(&self) -> Self {
-        let mut moved = *self;
-        let mut carry = self.0.last().map_or(0, |word| word >> 31);
-        for word in &mut moved.0 {
-            let next = *word >> 31;
-            *word = *word << 1 | carry;
-            carry = next;
+        let mut moved = Self::EMPTY;
+        let mut before = self.0.last().copied().unwrap_or(0);
+        for (word, &own) in moved.0.iter_mut().zip(&self.0) {
+            *word = own << 1 | before >> 31;
+            before = own;
         }
         moved
     }
 
-    /// Every state moved to the number before; the first one becomes the last.
-    pub(super) fn rotated_down(&self) -> Self {
-        let mut moved = *self;
-        let mut carry = self.0.first().map_or(0, |word| word << 31);
-        for word in moved.0.iter_mut().rev() {
-            let next = *word << 31;
-            *word = *word >> 1 | carry;
-            carry = next;
+    /// Every state moved to the next number and to the one before; the first and the last are next to each other.
+    pub(super) fn rotated_both_ways(&self) -> Self {
+        let mut moved = Self::EMPTY;
+        let mut before = self.0.last().copied().unwrap_or(0);
+        let behind = self.0.iter().skip(1).chain(self.0.first());
+        for ((word, &own), &next) in moved.0.iter_mut().zip(&self.0).zip(behind) {
+            *word = own << 1 | before >> 31 | own >> 1 | next << 31;
+            before = own;
         }
         moved
     }
@@ -109,7 +112,8 @@ mod tests {
     #[test]
     fn states_move_around_the_ring_either_way() {
         assert_eq!(set(&[0, 31, 63]).rotated_up(), set(&[1, 32, 0]));
-        assert_eq!(set(&[0, 32, 63]).rotated_down(), set(&[63, 31, 62]));
+        assert_eq!(set(&[0, 32]).rotated_both_ways(), set(&[63, 1, 31, 33]));
+        assert_eq!(set(&[63]).rotated_both_ways(), set(&[62, 0]));
         assert_eq!(set(&[1, 33]).halves_swapped(), set(&[33, 1]));
     }
 

@@ -1,0 +1,266 @@
+//! Listeners who join late, lose frames or hear them twice.
+
+use super::frame;
+use super::robot::{Random, Robot, TICKS_PER_HELLO};
+use toposlam::wire::{Decoder, Evidence, Location, Message, Picture, Progress, map_digest};
+use toposlam::{FaultKind, Fingerprint, Map, Update};
+
+const V: usize = 16;
+
+/// A listener, and whether it agrees with a robot.
+struct Listener<const V: usize> {
+    decoder: Decoder,
+    picture: Picture<V>,
+}
+
+impl<const V: usize> Listener<V> {
+    fn new() -> Self {
+        Self { decoder: Decoder::new(), picture: Picture::new() }
+    }
+
+    fn hear(&mut self, mut bytes: &[u8]) {
+        loop {
+            bytes = match self.decoder.feed(bytes) {
+                Progress::NeedsMore => return,
+                Progress::Error { rest, .. } => rest,
+                Progress::Message { header, message, rest } => {
+                    self.picture.apply(header, &message);
+                    rest
+                }
+            };
+        }
+    }
+}
+
+/// Whether the picture is the map, vertex by vertex and edge by edge (not by the digest).
+fn same<const V: usize, const W: usize>(picture: &Picture<W>, map: &Map<V>) -> bool {
+    picture.vertices() == map.vertices()
+        && picture.is_complete()
+        && picture.edges().eq(map.edges())
+        && (0..map.vertices()).all(|vertex| {
+            picture.row(vertex).is_some_and(|row| {
+                Some(row.radius_mm) == map.label(vertex).map(Fingerprint::radius_mm)
+                    && row.visits == map.visits(vertex)
+                    && row.neighbours == map.neighbours(vertex)
+            })
+        })
+}
+
+#[test]
+fn a_listener_from_the_start_has_the_map_after_every_place() {
+    let mut random = Random(1);
+    let mut robot = Robot::<V>::new(1);
+    let mut listener = Listener::<64>::new();
+    for step in 0..2000 {
+        if random.happens(10) {
+            robot.change_hypothesis(&mut random)
+        } else {
+            robot.drive(&mut random)
+        }
+        for frame in robot.place(&mut random) {
+            listener.hear(&frame);
+        }
+        // A row with many changes goes out whole, so nothing waits for the rolling picture.
+        assert!(listener.picture.is_converged(), "place {step}");
+        assert!(same(&listener.picture, &robot.map), "place {step}");
+        assert_eq!(listener.picture.location(), Some(Location::from(&Update { place_index: step, ..robot.update() })));
+        assert_eq!(listener.picture.evidence().map(|evidence| evidence.place_index), Some(step));
+    }
+}
+
+#[test]
+fn an_unchanged_map_is_not_sent_again_at_a_place() {
+    let mut random = Random(2);
+    let mut robot = Robot::<V>::new(1);
+    robot.change_hypothesis(&mut random);
+    robot.place(&mut random);
+    assert_eq!(robot.place(&mut random).len(), 2, "location and evidence");
+}
+
+#[test]
+fn one_new_vertex_and_its_edge_go_out_as_events() {
+    let mut robot = Robot::<V>::new(1);
+    robot.map.add_vertex(Fingerprint::ZERO).expect("there is room");
+    robot.place(&mut Random(3));
+    robot.map.add_vertex(Fingerprint::MAX).expect("there is room");
+    robot.map.add_edge(0, 1);
+    robot.location = 1;
+    let mut told = Vec::new();
+    robot.reporter.update(&robot.map, &robot.update(), |message| {
+        told.push(*message);
+        Ok(())
+    });
+    let update = robot.update();
+    let expected = [
+        Message::Vertex { vertex: 1, radius_mm: Fingerprint::MAX.radius_mm(), visits: 1 },
+        Message::Edge { a: 0, b: 1, present: true },
+        Message::Map { vertices: 2, edges: 1, digest: map_digest(&robot.map) },
+        Message::Location(Location::from(&update)),
+        Message::Evidence(Evidence::from(&update)),
+    ];
+    assert_eq!(told, expected);
+}
+
+#[test]
+fn a_late_listener_has_everything_after_one_round_of_the_rolling_picture() {
+    let mut random = Random(4);
+    for joined_at in 0..100 {
+        let mut robot = Robot::<V>::new(1);
+        for _ in 0..40 {
+            robot.drive(&mut random);
+            robot.place(&mut random);
+        }
+        robot.faults.count(FaultKind::BusError);
+        for _ in 0..joined_at {
+            robot.tick(&mut random);
+        }
+        let mut listener = Listener::<V>::new();
+        for _ in 0..robot.map.vertices() + 3 {
+            assert!(!listener.picture.is_converged() || same(&listener.picture, &robot.map));
+            for frame in robot.tick(&mut random) {
+                listener.hear(&frame);
+            }
+        }
+        assert!(listener.picture.is_converged() && same(&listener.picture, &robot.map), "joined at {joined_at}");
+        assert_eq!(listener.picture.location().map(|location| location.vertex), Some(robot.location));
+        assert_eq!(listener.picture.fault(FaultKind::BusError), 1);
+        for _ in 0..TICKS_PER_HELLO {
+            for frame in robot.tick(&mut random) {
+                listener.hear(&frame);
+            }
+        }
+        assert!(listener.picture.hello().is_some_and(|hello| hello.check().is_ok()));
+    }
+}
+
+/// Runs a robot over a bad line and holds the listener to what it claims: whenever it says that it has converged, its
+/// map is the robot's. Returns the share of ticks, in percent, after which it said so.
+fn hold_to_its_word(seed: u64, refused_percent: usize, mut line: impl FnMut(&mut Random, Vec<u8>) -> Vec<u8>) -> usize {
+    let mut random = Random(seed);
+    let mut robot = Robot::<V>::new(1);
+    robot.refused_percent = refused_percent;
+    let mut listener = Listener::<V>::new();
+    let (mut ticks, mut converged) = (0, 0);
+    for _ in 0..200 {
+        if random.happens(20) {
+            robot.change_hypothesis(&mut random)
+        } else {
+            robot.drive(&mut random)
+        }
+        let mut frames = robot.place(&mut random);
+        // A frame that nobody loses closes the update: silence alone tells a listener nothing.
+        let update = robot.update();
+        frames.push(frame(&mut robot.encoder, &Message::Evidence(Evidence::from(&update))));
+        let (closing, open) = frames.split_last().expect("there is one");
+        for frame in open {
+            listener.hear(&line(&mut random, frame.clone()));
+        }
+        listener.hear(&[0]);
+        listener.hear(closing);
+        assert!(!listener.picture.is_converged() || same(&listener.picture, &robot.map), "seed {seed}");
+        for _ in 0..30 {
+            for frame in robot.tick(&mut random) {
+                listener.hear(&line(&mut random, frame));
+                assert!(!listener.picture.is_converged() || same(&listener.picture, &robot.map), "seed {seed}");
+            }
+            ticks += 1;
+            converged += usize::from(listener.picture.is_converged());
+        }
+    }
+    robot.refused_percent = 0;
+    listener.hear(&[0]);
+    for _ in 0..robot.map.vertices() + 3 {
+        for frame in robot.tick(&mut random) {
+            listener.hear(&frame);
+        }
+    }
+    assert!(listener.picture.is_converged() && same(&listener.picture, &robot.map), "once the line is good again");
+    100 * converged / ticks
+}
+
+#[test]
+fn a_third_of_the_frames_lost_delays_the_map_and_never_falsifies_it() {
+    for seed in 0..20 {
+        let share = hold_to_its_word(seed, 0, |random, frame| if random.happens(30) { vec![] } else { frame });
+        assert!(share > 10, "converged after {share} % of the ticks");
+    }
+}
+
+#[test]
+fn damaged_and_repeated_frames_delay_the_map_and_never_falsify_it() {
+    for seed in 20..40 {
+        let share = hold_to_its_word(seed, 0, |random, mut frame| match random.below(10) {
+            0 => {
+                let place = random.below(frame.len());
+                frame[place] ^= 1 << random.below(8);
+                frame
+            }
+            1 => frame.repeat(2),
+            2 => frame.split_off(random.below(frame.len())),
+            _ => frame,
+        });
+        assert!(share > 10, "converged after {share} % of the ticks");
+    }
+}
+
+#[test]
+fn a_full_transmit_queue_delays_the_map_and_never_falsifies_it() {
+    for seed in 40..60 {
+        let share = hold_to_its_word(seed, 30, |_, frame| frame);
+        assert!(share > 10, "converged after {share} % of the ticks");
+    }
+}
+
+#[test]
+fn overtaken_frames_are_ignored_and_the_map_still_comes() {
+    let mut random = Random(60);
+    let mut robot = Robot::<V>::new(1);
+    let mut listener = Listener::<V>::new();
+    for _ in 0..200 {
+        if random.happens(20) {
+            robot.change_hypothesis(&mut random)
+        } else {
+            robot.drive(&mut random)
+        }
+        let mut frames = robot.place(&mut random);
+        for _ in 0..frames.len() / 4 {
+            let first = random.below(frames.len() - 1);
+            frames.swap(first, first + 1);
+        }
+        frames.iter().for_each(|frame| listener.hear(frame));
+        for _ in 0..robot.map.vertices() + 3 {
+            robot.tick(&mut random).iter().for_each(|frame| listener.hear(frame));
+        }
+        assert!(listener.picture.is_converged() && same(&listener.picture, &robot.map));
+    }
+}
+
+#[test]
+fn a_robot_that_starts_anew_begins_with_an_empty_picture() {
+    let mut random = Random(61);
+    let mut listener = Listener::<V>::new();
+    let mut robot = Robot::<V>::new(1);
+    robot.change_hypothesis(&mut random);
+    robot.tick(&mut random).iter().for_each(|frame| listener.hear(frame));
+    robot.place(&mut random).iter().for_each(|frame| listener.hear(frame));
+    assert!(listener.picture.is_converged());
+    let mut robot = Robot::<V>::new(2);
+    robot.tick(&mut random).iter().for_each(|frame| listener.hear(frame));
+    assert_eq!((listener.picture.vertices(), listener.picture.location()), (0, None));
+    assert!(listener.picture.is_converged());
+}
+
+#[test]
+fn a_map_of_64_vertices_arrives_whole() {
+    let mut random = Random(62);
+    let mut robot = Robot::<64>::new(1);
+    while robot.map.vertices() < 64 {
+        robot.drive(&mut random);
+    }
+    for (a, b) in (0..64).flat_map(|a| (0..64).map(move |b| (a, b))) {
+        robot.map.add_edge(a, b);
+    }
+    let mut listener = Listener::<64>::new();
+    robot.place(&mut random).iter().for_each(|frame| listener.hear(frame));
+    assert!(listener.picture.is_converged() && same(&listener.picture, &robot.map));
+}

@@ -1,0 +1,183 @@
+//! Streams that are split, cut, corrupted or mixed with foreign bytes, at every offset.
+
+use super::samples::{largest, typical};
+use super::{Heard, frame, hear};
+use proptest::prelude::*;
+use toposlam::wire::{Decoder, Encoder, MAX_FRAME_BYTES, Message};
+
+/// A stream of frames, and where each frame ends.
+fn stream() -> (Vec<Message>, Vec<u8>, Vec<usize>) {
+    let messages: Vec<_> = typical().into_iter().chain(largest()).collect();
+    let mut encoder = Encoder::new(0);
+    let mut bytes = Vec::new();
+    let mut ends = Vec::new();
+    for message in &messages {
+        bytes.extend(frame(&mut encoder, message));
+        ends.push(bytes.len());
+    }
+    (messages, bytes, ends)
+}
+
+/// The messages heard must be the ones sent but for those in `missing`, each under its own number.
+fn assert_only_missing(sent: &[Message], heard: &Heard, missing: std::ops::RangeInclusive<usize>, what: &str) {
+    let numbered: Vec<_> = heard.messages.iter().map(|(header, message)| (header.sequence.into(), *message)).collect();
+    let expected: Vec<_> = sent.iter().copied().enumerate().filter(|(number, _)| !missing.contains(number)).collect();
+    assert_eq!(numbered, expected, "{what}");
+}
+
+#[test]
+fn it_does_not_matter_where_the_stream_is_split() {
+    let (messages, bytes, _) = stream();
+    for split in 0..=bytes.len() {
+        let mut decoder = Decoder::new();
+        let mut heard = Heard::default();
+        heard.hear(&mut decoder, &bytes[..split]);
+        heard.hear(&mut decoder, &bytes[split..]);
+        assert_eq!(heard.messages.len(), messages.len());
+        assert_eq!(heard, hear(&bytes), "split at {split}");
+    }
+    let mut decoder = Decoder::new();
+    let mut heard = Heard::default();
+    for byte in &bytes {
+        heard.hear(&mut decoder, std::slice::from_ref(byte));
+    }
+    assert_eq!(heard, hear(&bytes), "byte by byte");
+}
+
+#[test]
+fn a_listener_can_join_at_any_byte() {
+    let (messages, bytes, ends) = stream();
+    for start in 0..bytes.len() {
+        let heard = hear(&bytes[start..]);
+        let touched = ends.iter().filter(|&&end| end <= start).count();
+        let whole = start == 0 || ends.contains(&start);
+        // A frame that lacks nothing but its closing zero was the one before; the zero alone is no frame.
+        let cut_errors = usize::from(!whole && !ends.contains(&(start + 1)));
+        let first = if whole { touched } else { touched + 1 };
+        assert_eq!(heard.messages.len(), messages.len() - first, "joined at {start}");
+        assert_eq!(heard.messages.first().map(|heard| heard.1), messages.get(first).copied(), "joined at {start}");
+        assert_eq!(heard.errors, cut_errors, "joined at {start}");
+    }
+}
+
+#[test]
+fn a_lost_byte_costs_one_frame_or_two_and_no_message_is_wrong() {
+    let (messages, bytes, ends) = stream();
+    for gone in 0..bytes.len() {
+        let mut damaged = bytes.clone();
+        damaged.remove(gone);
+        let touched = ends.iter().filter(|&&end| end <= gone).count();
+        // Without its zero a frame runs into the next one.
+        let last = touched + usize::from(bytes[gone] == 0);
+        assert_only_missing(&messages, &hear(&damaged), touched..=last, &format!("without byte {gone}"));
+    }
+}
+
+#[test]
+fn any_other_byte_in_any_place_costs_one_frame_or_two_and_no_message_is_wrong() {
+    let edge = Message::Edge { a: 1, b: 2, present: true };
+    for message in typical().into_iter().chain(largest()) {
+        let mut encoder = Encoder::new(0);
+        let [before, frame, after] = [edge, message, edge].map(|message| frame(&mut encoder, &message));
+        for place in 0..frame.len() {
+            let last = 1 + usize::from(frame[place] == 0);
+            for flip in 1..=255 {
+                let mut damaged = frame.clone();
+                damaged[place] ^= flip;
+                let heard = hear(&[&before[..], &damaged, &after].concat());
+                assert_only_missing(&[edge, message, edge], &heard, 1..=last, &format!("byte {place} ^ {flip}"));
+            }
+        }
+    }
+}
+
+#[test]
+fn foreign_bytes_anywhere_cost_at_most_one_frame_and_no_message_is_wrong() {
+    let (messages, bytes, ends) = stream();
+    let foreign: [&[u8]; 7] =
+        [&[0], &[0, 0, 0], &[1], &[0xFF], b"panicked at src/main.rs\r\n", &[5, 0, 7, 0], &[0xA5; 3 * MAX_FRAME_BYTES]];
+    for place in 0..=bytes.len() {
+        for foreign in foreign {
+            let mut damaged = bytes.clone();
+            damaged.splice(place..place, foreign.iter().copied());
+            let heard = hear(&damaged);
+            let touched = ends.iter().filter(|&&end| end <= place).count();
+            let between_frames = place == 0 || ends.contains(&place);
+            let before_the_zero = ends.contains(&(place + 1));
+            let closed = between_frames && foreign.ends_with(&[0]);
+            let opened = before_the_zero && foreign.starts_with(&[0]);
+            let what = format!("{foreign:?} at {place}");
+            if place == bytes.len() || closed || opened {
+                assert_eq!(heard.messages.len(), messages.len(), "{what}");
+            } else {
+                assert_only_missing(&messages, &heard, touched..=touched, &what);
+            }
+        }
+    }
+}
+
+#[test]
+fn every_kind_of_damage_is_counted_as_what_it_is() {
+    let edge = Message::Edge { a: 1, b: 2, present: true };
+    let good = frame(&mut Encoder::new(0), &edge);
+    let mut corrupt = good.clone();
+    corrupt[good.len() - 2] ^= 0x80;
+    let mut cut = good[..3].to_vec();
+    cut.push(0);
+    let mut too_long = vec![0xAA; 2000];
+    too_long.push(0);
+    let mut decoder = Decoder::new();
+    let mut heard = Heard::default();
+    for bytes in [&corrupt, &cut, &too_long, &with_crc(&[2, 0, 0, 4, 1, 2, 1]), &with_crc(&[1, 0, 0, 0x7F]), &good] {
+        heard.hear(&mut decoder, bytes);
+    }
+    let trailing = with_crc(&[1, 1, 0, 4, 1, 2, 1, 9]);
+    heard.hear(&mut decoder, &trailing);
+    heard.hear(&mut decoder, &frame(&mut Encoder::new(2), &edge));
+    let counters = decoder.counters();
+    assert_eq!((counters.corrupt, counters.cut, counters.too_long), (1, 1, 1));
+    assert_eq!((counters.unknown_version, counters.unknown_message), (1, 2));
+    assert_eq!((counters.messages, counters.lost), (2, 0), "an unknown message is not a lost one");
+    assert_eq!((heard.messages.len(), heard.errors), (2, 6));
+}
+
+proptest! {
+    #[test]
+    fn noise_is_no_message_and_the_frame_after_it_is_heard(noise in proptest::collection::vec(any::<u8>(), 0..600)) {
+        let edge = Message::Edge { a: 1, b: 2, present: true };
+        let stream = [&noise[..], &[0], &frame(&mut Encoder::new(0), &edge)].concat();
+        let messages: Vec<_> = hear(&stream).messages.into_iter().map(|(_, message)| message).collect();
+        prop_assert_eq!(messages, [edge]);
+    }
+
+    #[test]
+    fn an_intact_frame_of_any_payload_is_one_message_or_one_error(payload in proptest::collection::vec(any::<u8>(), 0..103)) {
+        let heard = hear(&with_crc(&[&[1, 0, 0], &payload[..]].concat()));
+        prop_assert_eq!(heard.messages.len() + heard.errors, 1);
+    }
+}
+
+/// A frame of the given header and payload, by another CRC and COBS than the library's.
+pub(crate) fn with_crc(body: &[u8]) -> Vec<u8> {
+    let mut crc = u32::MAX;
+    for byte in body {
+        crc ^= u32::from(*byte);
+        for _ in 0..8 {
+            crc = if crc & 1 == 1 { (crc >> 1) ^ 0xEDB8_8320 } else { crc >> 1 };
+        }
+    }
+    let raw: Vec<u8> = body.iter().copied().chain((!crc).to_le_bytes()).collect();
+    let mut out = vec![0];
+    let mut code = 0;
+    for byte in raw {
+        if byte == 0 {
+            code = out.len();
+            out.push(0);
+        } else {
+            out.push(byte);
+        }
+        out[code] = u8::try_from(out.len() - code).expect("short");
+    }
+    out.push(0);
+    out
+}

@@ -1,0 +1,119 @@
+//! The serial protocol: frames, decoder, reporter and picture, and the specification in `docs/wire.md`.
+
+mod convergence;
+mod damage;
+mod robot;
+mod samples;
+mod schema;
+mod specification;
+
+use samples::{largest, typical};
+use toposlam::wire::{Arrival, Decoder, Encoder, Header, MAX_FRAME_BYTES, Message, Progress};
+
+/// The frame of a message.
+fn frame(encoder: &mut Encoder, message: &Message) -> Vec<u8> {
+    encoder.encode(message, &mut [0; MAX_FRAME_BYTES]).expect("every message fits the largest frame").to_vec()
+}
+
+/// All that a decoder makes of some bytes.
+#[derive(Debug, Default, PartialEq)]
+struct Heard {
+    messages: Vec<(Header, Message)>,
+    errors: usize,
+}
+
+impl Heard {
+    fn hear(&mut self, decoder: &mut Decoder, mut bytes: &[u8]) {
+        loop {
+            match decoder.feed(bytes) {
+                Progress::NeedsMore => return,
+                Progress::Message { header, message, rest } => {
+                    assert!(bytes.ends_with(rest), "the rest is the unread tail");
+                    self.messages.push((header, message));
+                    bytes = rest;
+                }
+                Progress::Error { rest, .. } => {
+                    assert!(bytes.ends_with(rest), "the rest is the unread tail");
+                    self.errors += 1;
+                    bytes = rest;
+                }
+            }
+        }
+    }
+}
+
+fn hear(bytes: &[u8]) -> Heard {
+    let mut heard = Heard::default();
+    heard.hear(&mut Decoder::new(), bytes);
+    heard
+}
+
+#[test]
+fn every_message_comes_back_as_it_went_out() {
+    for message in typical().into_iter().chain(largest()) {
+        let heard = hear(&frame(&mut Encoder::new(300), &message));
+        assert_eq!(heard.messages, [(Header { sequence: 300, arrival: Arrival::First }, message)]);
+        assert_eq!(heard.errors, 0);
+    }
+}
+
+#[test]
+fn the_largest_message_fills_the_largest_frame_exactly() {
+    let longest = largest().iter().map(|message| frame(&mut Encoder::new(0xFFFF), message).len()).max();
+    assert_eq!(longest, Some(MAX_FRAME_BYTES));
+}
+
+#[test]
+fn a_frame_holds_one_zero_and_it_is_the_last_byte() {
+    for message in typical().into_iter().chain(largest()) {
+        let frame = frame(&mut Encoder::new(0), &message);
+        assert_eq!(frame.iter().position(|&byte| byte == 0), Some(frame.len() - 1));
+    }
+}
+
+#[test]
+fn the_sequence_wraps_without_a_gap() {
+    let mut encoder = Encoder::new(0xFFFE);
+    let mut decoder = Decoder::new();
+    let mut heard = Heard::default();
+    for message in typical().iter().take(4) {
+        heard.hear(&mut decoder, &frame(&mut encoder, message));
+    }
+    let headers: Vec<_> = heard.messages.iter().map(|(header, _)| (header.sequence, header.arrival)).collect();
+    let expected = [(0xFFFE, Arrival::First), (0xFFFF, Arrival::InOrder), (0, Arrival::InOrder), (1, Arrival::InOrder)];
+    assert_eq!(headers, expected);
+    assert_eq!(decoder.counters().lost, 0);
+}
+
+#[test]
+fn lost_repeated_and_restarted_frames_are_told_apart() {
+    let edge = Message::Edge { a: 0, b: 1, present: true };
+    let Message::Hello(mut hello) = typical()[0] else { panic!("the first sample is a Hello") };
+    let mut decoder = Decoder::new();
+    let mut arrival = |sequence, message: Message| {
+        let mut heard = Heard::default();
+        heard.hear(&mut decoder, &frame(&mut Encoder::new(sequence), &message));
+        heard.messages[0].0.arrival
+    };
+    assert_eq!(arrival(65530, Message::Hello(hello)), Arrival::First);
+    assert_eq!(arrival(65533, edge), Arrival::AfterGap { lost: 2 });
+    assert_eq!(arrival(65533, edge), Arrival::Late);
+    assert_eq!(arrival(2, edge), Arrival::AfterGap { lost: 4 });
+    assert_eq!(arrival(65535, edge), Arrival::Late);
+    assert_eq!(arrival(3, Message::Hello(hello)), Arrival::InOrder);
+    hello.boot += 1;
+    assert_eq!(arrival(0, Message::Hello(hello)), Arrival::Restart);
+    assert_eq!(arrival(1, edge), Arrival::InOrder);
+    assert_eq!(arrival(40_000, edge), Arrival::Restart);
+    assert_eq!(decoder.counters().lost, 6);
+}
+
+#[test]
+fn a_hello_with_other_messages_under_the_same_version_is_refused() {
+    let Message::Hello(mut hello) = typical()[0] else { panic!("the first sample is a Hello") };
+    assert_eq!(hello.check(), Ok(()));
+    hello.schema_hash ^= 1;
+    assert!(hello.check().is_err());
+    hello.protocol_version += 1;
+    assert_eq!(hello.check(), Ok(()), "a newer robot's known messages are understood");
+}

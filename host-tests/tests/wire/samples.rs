@@ -1,0 +1,87 @@
+//! One typical and one largest message of every kind.
+
+use toposlam::Fingerprint;
+use toposlam::ring::Echo;
+use toposlam::wire::{Capacities, Echoes, Evidence, Health, Hello, Location, Message, Row};
+
+/// A plausible message of every kind, in the order of their numbers.
+pub(crate) fn typical() -> Vec<Message> {
+    let capacities = Capacities {
+        vertices: 16,
+        hypotheses: 10,
+        history: 256,
+        ngram_length: 5,
+        fingerprint_step_mm: Fingerprint::STEP_MM as u8,
+        sonars: 16,
+    };
+    let mut ring = [Echo::Range { range_mm: 1480 }; 16];
+    ring[3] = Echo::Silence;
+    ring[7] = Echo::Dead;
+    vec![
+        Message::Hello(Hello::new(17, 1, capacities)),
+        Message::Place { place_index: 42, frame_index: 5310, radius_mm: 1172, degree: Some(3) },
+        Message::Map { vertices: 11, edges: 13, digest: 0x8C3A_51F0 },
+        Message::Vertex { vertex: 3, radius_mm: 1172, visits: 12 },
+        Message::Edge { a: 3, b: 7, present: true },
+        Message::Location(Location { place_index: 42, vertex: 3 }),
+        Message::Evidence(Evidence {
+            place_index: 42,
+            consistency_mm: 84,
+            ln_label_q16: -13_107,
+            ln_consistency_q16: -42_000,
+            ln_size_q16: -829_000,
+            lead_q16: 30_500,
+            distinct_hypotheses: 6,
+        }),
+        Message::Row(Row { vertex: 3, radius_mm: 1172, visits: 12, neighbours: 0b1010_0010 }),
+        Message::Fault { kind: 2, count: 5 },
+        Message::Health(Health {
+            uptime_ms: 345_000,
+            loop_count: 5310,
+            stack_high_water_bytes: 3000,
+            worst_update_us: 9_800,
+        }),
+        Message::Ring { frame_index: 5310, echoes: Echoes::new(&ring) },
+    ]
+}
+
+/// Every kind with the values that take the most bytes.
+pub(crate) fn largest() -> Vec<Message> {
+    const BYTE: u8 = u8::MAX;
+    const SHORT: u16 = u16::MAX;
+    const WORD: u32 = u32::MAX;
+    let capacities = Capacities {
+        vertices: BYTE,
+        hypotheses: SHORT,
+        history: SHORT,
+        ngram_length: BYTE,
+        fingerprint_step_mm: BYTE,
+        sonars: BYTE,
+    };
+    vec![
+        Message::Hello(Hello { protocol_version: SHORT, schema_hash: !0, boot: WORD, seed: !0, capacities }),
+        Message::Place { place_index: WORD, frame_index: WORD, radius_mm: SHORT, degree: Some(BYTE) },
+        Message::Map { vertices: BYTE, edges: SHORT, digest: WORD },
+        Message::Vertex { vertex: BYTE, radius_mm: SHORT, visits: WORD },
+        Message::Edge { a: BYTE, b: BYTE, present: true },
+        Message::Location(Location { place_index: WORD, vertex: BYTE }),
+        Message::Evidence(Evidence {
+            place_index: WORD,
+            consistency_mm: SHORT,
+            ln_label_q16: i32::MIN,
+            ln_consistency_q16: i32::MIN,
+            ln_size_q16: i32::MIN,
+            lead_q16: i32::MAX,
+            distinct_hypotheses: SHORT,
+        }),
+        Message::Row(Row { vertex: BYTE, radius_mm: SHORT, visits: WORD, neighbours: !0 }),
+        Message::Fault { kind: BYTE, count: WORD },
+        Message::Health(Health {
+            uptime_ms: WORD,
+            loop_count: WORD,
+            stack_high_water_bytes: WORD,
+            worst_update_us: WORD,
+        }),
+        Message::Ring { frame_index: WORD, echoes: Echoes::new(&[Echo::Range { range_mm: SHORT }; Echoes::MAX]) },
+    ]
+}

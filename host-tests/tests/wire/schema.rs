@@ -1,0 +1,219 @@
+//! The schema: a description of all messages, taken from the types themselves by a serde serializer.
+
+use super::samples::typical;
+use serde::ser::{self, Serialize};
+use toposlam::wire::SCHEMA_HASH;
+
+/// One line for each message: its number, its name, and the names and types of its fields.
+pub(crate) fn description() -> String {
+    typical().iter().map(|message| describe(message) + "\n").collect()
+}
+
+/// FNV-1a, 64 bit.
+pub(crate) fn fnv1a(text: &str) -> u64 {
+    text.bytes().fold(0xCBF2_9CE4_8422_2325, |hash, byte| (hash ^ u64::from(byte)).wrapping_mul(0x0100_0000_01B3))
+}
+
+#[test]
+fn the_pinned_schema_hash_is_that_of_the_types() {
+    let description = description();
+    let hash = fnv1a(&description);
+    assert_eq!(
+        SCHEMA_HASH, hash,
+        "the messages have changed: they may only be appended to; raise PROTOCOL_VERSION, set SCHEMA_HASH to {hash:#018X}:\n{description}"
+    );
+}
+
+#[test]
+fn the_samples_hold_every_message_in_the_order_of_its_number() {
+    let names: Vec<_> = typical()
+        .iter()
+        .map(|message| describe(message).split([' ', '(']).nth(1).unwrap_or_default().to_owned())
+        .collect();
+    let expected =
+        ["Hello", "Place", "Map", "Vertex", "Edge", "Location", "Evidence", "Row", "Fault", "Health", "Ring"];
+    assert_eq!(names, expected);
+    for (number, message) in typical().iter().enumerate() {
+        assert!(describe(message).starts_with(&format!("{number} ")));
+    }
+    // Zeros are a value of every type: a message with the next number would be heard, and need a sample here.
+    for zeros in 0..100 {
+        let mut body = vec![1, 0, 0, expected.len() as u8];
+        body.resize(body.len() + zeros, 0);
+        assert_eq!(super::hear(&super::damage::with_crc(&body)).messages, []);
+    }
+}
+
+#[test]
+fn a_renamed_or_moved_field_changes_the_description() {
+    #[derive(Clone, Copy)]
+    struct Pair(&'static str, &'static str);
+    impl Serialize for Pair {
+        fn serialize<S: ser::Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+            use ser::SerializeStruct;
+            let mut fields = serializer.serialize_struct("Pair", 2)?;
+            fields.serialize_field(self.0, &1u8)?;
+            fields.serialize_field(self.1, &Some(2u16))?;
+            fields.end()
+        }
+    }
+    assert_eq!(describe(&Pair("a", "b")), "Pair { a: u8, b: Option<u16> }");
+    assert_ne!(describe(&Pair("a", "b")), describe(&Pair("b", "a")));
+}
+
+fn describe(value: &impl Serialize) -> String {
+    value.serialize(Describer).expect("every message can be described")
+}
+
+struct Describer;
+
+/// The fields of a struct, or the elements of a sequence.
+struct Fields {
+    open: String,
+    close: &'static str,
+    fields: Vec<String>,
+}
+
+type Described = Result<String, std::fmt::Error>;
+
+impl Fields {
+    fn new(open: String, close: &'static str) -> Self {
+        Self { open, close, fields: Vec::new() }
+    }
+
+    fn describe(self) -> Described {
+        Ok(format!("{}{}{}", self.open, self.fields.join(", "), self.close))
+    }
+
+    fn element(&mut self, value: &(impl Serialize + ?Sized)) -> Result<(), std::fmt::Error> {
+        self.fields.push(value.serialize(Describer)?);
+        Ok(())
+    }
+
+    fn field(&mut self, name: &str, value: &(impl Serialize + ?Sized)) -> Result<(), std::fmt::Error> {
+        self.fields.push(format!("{name}: {}", value.serialize(Describer)?));
+        Ok(())
+    }
+}
+
+/// A number is described by its type.
+macro_rules! by_type {
+    ($($method:ident: $type:ty,)*) => {
+        $(fn $method(self, _: $type) -> Described { Ok(stringify!($type).to_owned()) })*
+    };
+}
+
+/// The messages hold none of these.
+macro_rules! never {
+    ($($method:ident($($type:ty),*) -> $result:ty,)*) => {
+        $(fn $method(self, $(_: $type),*) -> $result { Err(std::fmt::Error) })*
+    };
+}
+
+impl ser::Serializer for Describer {
+    type Ok = String;
+    type Error = std::fmt::Error;
+    type SerializeSeq = Fields;
+    type SerializeTuple = ser::Impossible<String, std::fmt::Error>;
+    type SerializeTupleStruct = ser::Impossible<String, std::fmt::Error>;
+    type SerializeTupleVariant = ser::Impossible<String, std::fmt::Error>;
+    type SerializeMap = ser::Impossible<String, std::fmt::Error>;
+    type SerializeStruct = Fields;
+    type SerializeStructVariant = Fields;
+
+    by_type! {
+        serialize_bool: bool, serialize_i8: i8, serialize_i16: i16, serialize_i32: i32, serialize_i64: i64,
+        serialize_u8: u8, serialize_u16: u16, serialize_u32: u32, serialize_u64: u64, serialize_f32: f32,
+        serialize_f64: f64, serialize_char: char,
+    }
+
+    never! {
+        serialize_str(&str) -> Described,
+        serialize_bytes(&[u8]) -> Described,
+        serialize_none() -> Described,
+        serialize_unit() -> Described,
+        serialize_unit_struct(&'static str) -> Described,
+        serialize_unit_variant(&'static str, u32, &'static str) -> Described,
+        serialize_tuple(usize) -> Result<Self::SerializeTuple, Self::Error>,
+        serialize_tuple_struct(&'static str, usize) -> Result<Self::SerializeTupleStruct, Self::Error>,
+        serialize_tuple_variant(&'static str, u32, &'static str, usize) -> Result<Self::SerializeTupleVariant, Self::Error>,
+        serialize_map(Option<usize>) -> Result<Self::SerializeMap, Self::Error>,
+    }
+
+    fn serialize_some<T: Serialize + ?Sized>(self, value: &T) -> Described {
+        Ok(format!("Option<{}>", value.serialize(Describer)?))
+    }
+
+    fn serialize_newtype_struct<T: Serialize + ?Sized>(self, name: &'static str, value: &T) -> Described {
+        Ok(format!("{name}({})", value.serialize(Describer)?))
+    }
+
+    fn serialize_newtype_variant<T: Serialize + ?Sized>(
+        self,
+        _: &'static str,
+        number: u32,
+        name: &'static str,
+        value: &T,
+    ) -> Described {
+        Ok(format!("{number} {name}({})", value.serialize(Describer)?))
+    }
+
+    fn serialize_seq(self, _: Option<usize>) -> Result<Fields, Self::Error> {
+        Ok(Fields::new("[".to_owned(), "]"))
+    }
+
+    fn serialize_struct(self, name: &'static str, _: usize) -> Result<Fields, Self::Error> {
+        Ok(Fields::new(format!("{name} {{ "), " }"))
+    }
+
+    fn serialize_struct_variant(
+        self,
+        _: &'static str,
+        number: u32,
+        name: &'static str,
+        _: usize,
+    ) -> Result<Fields, Self::Error> {
+        Ok(Fields::new(format!("{number} {name} {{ "), " }"))
+    }
+}
+
+impl ser::SerializeSeq for Fields {
+    type Ok = String;
+    type Error = std::fmt::Error;
+
+    fn serialize_element<T: Serialize + ?Sized>(&mut self, value: &T) -> Result<(), Self::Error> {
+        self.element(value)
+    }
+
+    /// The elements of a sequence have one type, however many there are.
+    fn end(mut self) -> Described {
+        self.fields.dedup();
+        self.describe()
+    }
+}
+
+impl ser::SerializeStruct for Fields {
+    type Ok = String;
+    type Error = std::fmt::Error;
+
+    fn serialize_field<T: Serialize + ?Sized>(&mut self, name: &'static str, value: &T) -> Result<(), Self::Error> {
+        self.field(name, value)
+    }
+
+    fn end(self) -> Described {
+        self.describe()
+    }
+}
+
+impl ser::SerializeStructVariant for Fields {
+    type Ok = String;
+    type Error = std::fmt::Error;
+
+    fn serialize_field<T: Serialize + ?Sized>(&mut self, name: &'static str, value: &T) -> Result<(), Self::Error> {
+        self.field(name, value)
+    }
+
+    fn end(self) -> Described {
+        self.describe()
+    }
+}

@@ -1,0 +1,195 @@
+//! Compares the places that were detected with the true nodes that were visited.
+
+use std::fmt;
+
+use toposlam::place::Place;
+
+use super::{TrueMap, Truth};
+
+/// A place detected farther from every true node is a phantom, in millimetres.
+const MATCH_MM: f64 = 500.0;
+/// A detected place belongs to a visit when it is at most this many frames off.
+const MATCH_FRAMES: u32 = 30;
+
+/// One visit to a true node.
+#[derive(Clone, Copy, Debug)]
+struct Visit {
+    node: usize,
+    first_frame: u32,
+    last_frame: u32,
+}
+
+impl Visit {
+    /// How many frames lie between the visit and a frame.
+    fn frames_off(&self, frame_index: u32) -> u32 {
+        self.first_frame.saturating_sub(frame_index).max(frame_index.saturating_sub(self.last_frame))
+    }
+}
+
+/// A detected place and the true node it was detected at, if any.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Detection {
+    /// What the detector said.
+    pub place: Place,
+    /// Where the robot was in the place's frame.
+    pub position: super::Point,
+    /// The true node nearby; `None` for a phantom.
+    pub node: Option<usize>,
+}
+
+/// A log of a drive: what was visited and what was detected. Memory grows by some 40 bytes a frame.
+pub struct Journal {
+    map: TrueMap,
+    truths: Vec<Truth>,
+    visits: Vec<Visit>,
+    detections: Vec<Detection>,
+}
+
+/// How the detected places compare with the visits.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Report {
+    /// Completed visits to true nodes.
+    pub visits: usize,
+    /// Visits that gave at least one place.
+    pub found: usize,
+    /// Visits that gave none.
+    pub missed: usize,
+    /// Places beyond the first of a visit.
+    pub doubled: usize,
+    /// Places away from every true node.
+    pub phantom: usize,
+    /// Detected radius less true radius of every place found, in millimetres, in ascending order.
+    pub radius_errors_mm: Vec<f64>,
+    /// Found places whose degree was told, and those among them where it was right.
+    pub degrees: (usize, usize),
+    /// Each true node's visits and misses.
+    pub nodes: Vec<(usize, usize)>,
+}
+
+impl Journal {
+    /// An empty log of a drive on a map.
+    pub fn new(map: &TrueMap) -> Self {
+        Self { map: map.clone(), truths: Vec::new(), visits: Vec::new(), detections: Vec::new() }
+    }
+
+    /// Notes where the robot is; once for every frame, before the frame's place if there is one.
+    pub fn drive(&mut self, truth: &Truth) {
+        self.truths.push(*truth);
+        let Some(node) = truth.node else { return };
+        match self.visits.last_mut() {
+            Some(visit) if visit.node == node && visit.last_frame + 2 >= truth.frame_index => {
+                visit.last_frame = truth.frame_index;
+            }
+            _ => {
+                self.visits.push(Visit { node, first_frame: truth.frame_index, last_frame: truth.frame_index });
+            }
+        }
+    }
+
+    /// Notes a detected place and says at which true node it was.
+    pub fn detect(&mut self, place: &Place) -> Detection {
+        let truth = self.truths.get(place.frame_index as usize).or(self.truths.last());
+        let position = truth.map(|truth| truth.pose.position).unwrap_or_default();
+        let near = self.map.nearest_node(position).filter(|(_, distance_mm)| *distance_mm <= MATCH_MM);
+        let detection = Detection { place: *place, position, node: near.map(|(node, _)| node) };
+        self.detections.push(detection);
+        detection
+    }
+
+    /// How many visits to true nodes began so far.
+    pub fn visits(&self) -> usize {
+        self.visits.len()
+    }
+
+    /// Every detected place so far.
+    pub fn detections(&self) -> &[Detection] {
+        &self.detections
+    }
+
+    /// The comparison. The last visit is left out, since its place may not be reported yet.
+    pub fn report(&self) -> Report {
+        let completed = self.visits.len().saturating_sub(1);
+        let mut places_of = vec![0usize; self.visits.len()];
+        let mut report = Report {
+            visits: completed,
+            found: 0,
+            missed: 0,
+            doubled: 0,
+            phantom: 0,
+            radius_errors_mm: Vec::new(),
+            degrees: (0, 0),
+            nodes: vec![(0, 0); self.map.nodes.len()],
+        };
+        for Detection { place, node, .. } in &self.detections {
+            let begun = self.visits.iter().enumerate().filter(|(_, visit)| Some(visit.node) == *node);
+            let visit = begun.min_by_key(|(_, visit)| visit.frames_off(place.frame_index));
+            let Some((index, visit)) = visit.filter(|(_, visit)| visit.frames_off(place.frame_index) <= MATCH_FRAMES)
+            else {
+                report.phantom += 1;
+                continue;
+            };
+            places_of[index] += 1;
+            let truth = &self.map.nodes[visit.node];
+            report.radius_errors_mm.push(f64::from(place.fingerprint.radius_mm()) - truth.radius_mm);
+            if let Some(degree) = place.degree {
+                report.degrees.0 += 1;
+                report.degrees.1 += usize::from(usize::from(degree) == truth.degree);
+            }
+        }
+        for (visit, places) in self.visits.iter().zip(places_of).take(completed) {
+            let node = &mut report.nodes[visit.node];
+            node.0 += 1;
+            node.1 += usize::from(places == 0);
+            report.missed += usize::from(places == 0);
+            report.found += usize::from(places > 0);
+            report.doubled += places.saturating_sub(1);
+        }
+        report.radius_errors_mm.sort_by(f64::total_cmp);
+        report
+    }
+}
+
+impl Report {
+    /// The radius error that half of the places do not exceed in absolute value, in millimetres.
+    pub fn radius_error_median_mm(&self) -> f64 {
+        self.radius_error_mm(0.5)
+    }
+
+    /// The radius error that nine tenths of the places do not exceed in absolute value, in millimetres.
+    pub fn radius_error_p90_mm(&self) -> f64 {
+        self.radius_error_mm(0.9)
+    }
+
+    fn radius_error_mm(&self, share: f64) -> f64 {
+        let mut sizes: Vec<f64> = self.radius_errors_mm.iter().map(|error_mm| error_mm.abs()).collect();
+        sizes.sort_by(f64::total_cmp);
+        let rank = (share * sizes.len() as f64) as usize;
+        sizes.get(rank.min(sizes.len().saturating_sub(1))).copied().unwrap_or(0.0)
+    }
+
+    /// Mean and standard deviation of the radius errors, in millimetres.
+    pub fn radius_error_mean_and_sd_mm(&self) -> (f64, f64) {
+        let count = self.radius_errors_mm.len().max(1) as f64;
+        let mean = self.radius_errors_mm.iter().sum::<f64>() / count;
+        let variance = self.radius_errors_mm.iter().map(|error_mm| (error_mm - mean).powi(2)).sum::<f64>() / count;
+        (mean, variance.sqrt())
+    }
+}
+
+impl fmt::Display for Report {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let (mean, sd) = self.radius_error_mean_and_sd_mm();
+        writeln!(
+            f,
+            "visits {}: found {}, missed {}, doubled {}, phantom {}",
+            self.visits, self.found, self.missed, self.doubled, self.phantom
+        )?;
+        writeln!(
+            f,
+            "radius error: median {:.0} mm, 90 % within {:.0} mm, mean {mean:+.0} mm, standard deviation {sd:.0} mm",
+            self.radius_error_median_mm(),
+            self.radius_error_p90_mm()
+        )?;
+        write!(f, "degree: told for {} places, right for {}", self.degrees.0, self.degrees.1)
+    }
+}

@@ -1,0 +1,208 @@
+//! What a ring of sonars hears in a floor plan.
+
+use std::f64::consts::{PI, TAU};
+
+use rand::{Rng, RngExt};
+use rand_distr::{Distribution, StandardNormal};
+use toposlam::ring::{Echo, RingFrame, RingGeometry};
+
+use super::plan::Plan;
+use super::{Point, Pose};
+
+/// How many sonars the simulated ring has.
+pub const SONARS: usize = 16;
+/// Rays cast for each sonar's share of the turn; the cones overlap and share their rays.
+const RAYS_EACH: usize = 6;
+const RAYS: usize = SONARS * RAYS_EACH;
+
+/// How good the sonars are.
+///
+/// A sonar hears the nearest thing in its cone that sends sound back: a wall that is hit not too far off its normal,
+/// or a corner, convex (its edge scatters) or concave (it reflects straight back).
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SonarModel {
+    /// Half the opening angle of a cone, in radians. Default 0.262 (15°).
+    pub cone_half_angle_rad: f64,
+    /// Nothing nearer is heard, in millimetres. Default 30 (SRF08).
+    pub range_min_mm: f64,
+    /// Nothing farther is heard, in millimetres. Default 6000 (SRF08).
+    pub range_max_mm: f64,
+    /// Standard deviation of a range, in millimetres. Default 15.
+    pub range_sd_mm: f64,
+    /// Share of the echoes that are missed, 0 to 1. Default 0.02.
+    pub missed_share: f64,
+    /// A wall hit farther off its normal reflects the sound away, in radians. Default 0.436 (25°).
+    pub specular_limit_rad: f64,
+    /// Which sonars never answer, a bit for each. Default none.
+    pub dead_sonars: u16,
+}
+
+impl Default for SonarModel {
+    fn default() -> Self {
+        Self {
+            cone_half_angle_rad: 15f64.to_radians(),
+            range_min_mm: 30.0,
+            range_max_mm: 6000.0,
+            range_sd_mm: 15.0,
+            missed_share: 0.02,
+            specular_limit_rad: 25f64.to_radians(),
+            dead_sonars: 0,
+        }
+    }
+}
+
+/// The simulated ring: 16 sonars 22.5° apart, counter-clockwise, the first straight ahead.
+pub fn even_ring() -> RingGeometry<SONARS> {
+    let mut geometry = RingGeometry { bearings_mrad: [0; SONARS] };
+    for (sonar, bearing_mrad) in geometry.bearings_mrad.iter_mut().enumerate() {
+        *bearing_mrad = (wrapped(TAU * sonar as f64 / SONARS as f64) * 1000.0).round() as i16;
+    }
+    geometry
+}
+
+/// An angle brought into −π to π.
+pub(super) fn wrapped(angle_rad: f64) -> f64 {
+    (angle_rad + PI).rem_euclid(TAU) - PI
+}
+
+/// A floor plan prepared for ray casting.
+pub(super) struct Scene {
+    plan: Plan,
+    corners: Vec<Point>,
+}
+
+impl Scene {
+    pub(super) fn new(plan: &Plan) -> Self {
+        Self { plan: plan.clone(), corners: plan.corners() }
+    }
+
+    /// One reading of the ring.
+    pub(super) fn frame(&self, pose: &Pose, model: &SonarModel, random: &mut impl Rng) -> RingFrame<SONARS> {
+        let mut heard_mm = self.walls(pose, model);
+        self.hear_corners(pose, model, &mut heard_mm);
+        let mut echoes = [Echo::Dead; SONARS];
+        for (sonar, (echo, heard_mm)) in echoes.iter_mut().zip(heard_mm).enumerate() {
+            // Drawn for every sonar, so that a dead one does not change what the others hear.
+            let noise_mm: f64 = StandardNormal.sample(random);
+            let missed = random.random_bool(model.missed_share);
+            let range_mm = (heard_mm + noise_mm * model.range_sd_mm).max(model.range_min_mm);
+            if model.dead_sonars >> sonar & 1 == 1 {
+                *echo = Echo::Dead;
+            } else if missed || range_mm > model.range_max_mm {
+                *echo = Echo::Silence;
+            } else {
+                *echo = Echo::Range { range_mm: range_mm.round() as u16 };
+            }
+        }
+        RingFrame { echoes }
+    }
+
+    /// The nearest wall that each sonar hears, in millimetres; infinite when there is none.
+    fn walls(&self, pose: &Pose, model: &SonarModel) -> [f64; SONARS] {
+        let spacing = TAU / RAYS as f64;
+        let rays: [f64; RAYS] = std::array::from_fn(|ray| {
+            let direction = pose.heading_rad + ray as f64 * spacing;
+            let (hit_mm, off_normal_rad) = self.cast(pose.position, direction, model.range_max_mm);
+            if off_normal_rad <= model.specular_limit_rad { hit_mm } else { f64::INFINITY }
+        });
+        let half = ((model.cone_half_angle_rad / spacing) as usize).min(RAYS / 2);
+        std::array::from_fn(|sonar| {
+            let first = sonar * RAYS_EACH + RAYS - half;
+            (first..=first + 2 * half).map(|ray| rays[ray % RAYS]).fold(f64::INFINITY, f64::min)
+        })
+    }
+
+    /// Lets each sonar hear the corners in its cone that are in sight.
+    fn hear_corners(&self, pose: &Pose, model: &SonarModel, heard_mm: &mut [f64; SONARS]) {
+        for corner in &self.corners {
+            let range_mm = pose.position.distance_mm(*corner);
+            if range_mm > model.range_max_mm {
+                continue;
+            }
+            let direction = pose.position.direction_to(*corner);
+            let mut in_sight = None;
+            for (sonar, heard_mm) in heard_mm.iter_mut().enumerate() {
+                let axis = pose.heading_rad + TAU * sonar as f64 / SONARS as f64;
+                if range_mm < *heard_mm && wrapped(direction - axis).abs() <= model.cone_half_angle_rad {
+                    let seen = *in_sight
+                        .get_or_insert_with(|| self.cast(pose.position, direction, range_mm).0 >= range_mm - 1.0);
+                    if seen {
+                        *heard_mm = range_mm;
+                    }
+                }
+            }
+        }
+    }
+
+    /// Where a ray meets the first wall: the distance in millimetres (infinite beyond the limit), and how far off the
+    /// wall's normal it hits.
+    fn cast(&self, from: Point, direction: f64, limit_mm: f64) -> (f64, f64) {
+        let cell_mm = f64::from(self.plan.cell_mm());
+        let (sine, cosine) = direction.sin_cos();
+        let (mut column, mut row) = ((from.x_mm / cell_mm).floor() as i32, (from.y_mm / cell_mm).floor() as i32);
+        // For each axis: the step in cells, the way between two grid lines, the way to the first one.
+        let axis = |cell: i32, start_mm: f64, slope: f64| {
+            let line = if slope > 0.0 { cell + 1 } else { cell };
+            let to_line = (f64::from(line) * cell_mm - start_mm) / slope;
+            (
+                if slope > 0.0 { 1 } else { -1 },
+                (cell_mm / slope).abs(),
+                if slope == 0.0 { f64::INFINITY } else { to_line },
+            )
+        };
+        let (step_x, between_x, mut to_x) = axis(column, from.x_mm, cosine);
+        let (step_y, between_y, mut to_y) = axis(row, from.y_mm, sine);
+        loop {
+            let (way_mm, into) = if to_x < to_y {
+                column += step_x;
+                to_x += between_x;
+                (to_x - between_x, cosine.abs())
+            } else {
+                row += step_y;
+                to_y += between_y;
+                (to_y - between_y, sine.abs())
+            };
+            if way_mm > limit_mm {
+                return (f64::INFINITY, 0.0);
+            }
+            if self.plan.is_wall(column, row) {
+                return (way_mm, into.min(1.0).acos());
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use rand::SeedableRng;
+    use rand_xoshiro::Xoshiro256PlusPlus;
+
+    fn closet() -> Scene {
+        let row = ".".repeat(16);
+        let rows = vec![row.as_str(); 7].join("\n");
+        Scene::new(&Plan::parse(&format!("cell_mm 250\n{}S\n{rows}", ".".repeat(15))).unwrap())
+    }
+
+    #[test]
+    fn a_ray_ends_at_the_wall_it_meets() {
+        let (range_mm, off_normal_rad) = closet().cast(Point::new(1000.0, 600.0), 0.3, 6000.0);
+        assert!((range_mm - 3000.0 / 0.3f64.cos()).abs() < 1e-6);
+        assert!((off_normal_rad - 0.3).abs() < 1e-9);
+    }
+
+    #[test]
+    fn the_walls_of_a_room_are_heard_ahead_and_beside_and_specular_loss_leaves_the_corners() {
+        let perfect = SonarModel { range_sd_mm: 0.0, missed_share: 0.0, ..SonarModel::default() };
+        let pose = Pose { position: Point::new(3000.0, 1000.0), heading_rad: 0.0 };
+        let mut random = Xoshiro256PlusPlus::seed_from_u64(1);
+        let frame = closet().frame(&pose, &perfect, &mut random);
+        let heard = frame.echoes.map(|echo| echo.range_mm().unwrap_or(0));
+        assert_eq!((heard[0], heard[4], heard[8], heard[12]), (1000, 1000, 3000, 1000));
+        assert_eq!((heard[2], heard[14]), (1414, 1414));
+        let dead = SonarModel { dead_sonars: 1 << 4, ..perfect };
+        assert_eq!(closet().frame(&pose, &dead, &mut random).echoes[4], Echo::Dead);
+        let missed = SonarModel { missed_share: 1.0, ..perfect };
+        assert_eq!(closet().frame(&pose, &missed, &mut random).echoes, [Echo::Silence; SONARS]);
+    }
+}

@@ -1,0 +1,293 @@
+//! A robot that drives the true Voronoi graph at random and reads its sonars at every step.
+
+use std::f64::consts::PI;
+
+use rand::{RngExt, SeedableRng};
+use rand_distr::{Distribution, StandardNormal};
+use rand_xoshiro::Xoshiro256PlusPlus;
+use toposlam::ring::RingFrame;
+
+use super::sight::{SONARS, Scene, SonarModel, wrapped};
+use super::{Plan, Point, TrueEdge, TrueMap, VoronoiError};
+
+/// Where the robot is and where it looks.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Pose {
+    /// The centre of the ring.
+    pub position: Point,
+    /// Where the first sonar looks, counter-clockwise from the x axis, in radians.
+    pub heading_rad: f64,
+}
+
+impl Pose {
+    /// The heading in milliradians, −3142 to 3142.
+    pub fn heading_mrad(&self) -> i16 {
+        (wrapped(self.heading_rad) * 1000.0).round() as i16
+    }
+}
+
+/// What is true in one frame.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Truth {
+    /// The frame, counted from 0.
+    pub frame_index: u32,
+    /// Where the robot is.
+    pub pose: Pose,
+    /// The true node that the robot is at: in the frame in which it comes by, and while it turns there.
+    pub node: Option<usize>,
+}
+
+/// How the robot drives and what its sonars are worth.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct RobotModel {
+    /// Speed, in millimetres a second. Default 300.
+    pub speed_mm_per_s: f64,
+    /// Ring frames a second. Default 10 (an SRF08 ring ranging all at once takes 65 ms).
+    pub frames_per_s: f64,
+    /// How fast the robot turns on the spot, in radians a second. Default π/2.
+    pub turn_rad_per_s: f64,
+    /// How often the robot turns back at a node that leads on, 0 to 1. Default 0.1. At dead ends it always does.
+    pub u_turn_share: f64,
+    /// Standard deviation of the way driven from the Voronoi graph, sideways, in millimetres. Default 20.
+    pub track_sd_mm: f64,
+    /// Standard deviation of the heading from the way's direction, in radians. Default 0.03.
+    pub heading_sd_rad: f64,
+    /// How long the two deviations last, in seconds. Default 1.
+    pub deviation_s: f64,
+    /// Its sonars.
+    pub sonar: SonarModel,
+}
+
+impl Default for RobotModel {
+    fn default() -> Self {
+        Self {
+            speed_mm_per_s: 300.0,
+            frames_per_s: 10.0,
+            turn_rad_per_s: PI / 2.0,
+            u_turn_share: 0.1,
+            track_sd_mm: 20.0,
+            heading_sd_rad: 0.03,
+            deviation_s: 1.0,
+            sonar: SonarModel::default(),
+        }
+    }
+}
+
+impl RobotModel {
+    /// The same robot with every noise multiplied: range noise, missed echoes, and deviation from the way.
+    pub fn with_noise(self, factor: f64) -> Self {
+        let sonar = SonarModel {
+            range_sd_mm: self.sonar.range_sd_mm * factor,
+            missed_share: (self.sonar.missed_share * factor).clamp(0.0, 1.0),
+            ..self.sonar
+        };
+        Self { track_sd_mm: self.track_sd_mm * factor, heading_sd_rad: self.heading_sd_rad * factor, sonar, ..self }
+    }
+}
+
+/// A deviation of standard deviation 1 that fades slowly into the next one.
+struct Drift(f64);
+
+impl Drift {
+    /// The deviation a time step later, for a step of this share of the time that deviations last.
+    fn step(&mut self, share: f64, random: &mut Xoshiro256PlusPlus) -> f64 {
+        let kept = (-share).exp();
+        let fresh: f64 = StandardNormal.sample(random);
+        self.0 = kept * self.0 + (1.0 - kept * kept).sqrt() * fresh;
+        self.0
+    }
+}
+
+/// A drive without end: an iterator over the ring frames and what is true in each.
+///
+/// The same plan, model and seed give the same drive.
+pub struct Simulation {
+    scene: Scene,
+    map: TrueMap,
+    model: RobotModel,
+    random: Xoshiro256PlusPlus,
+    frame_index: u32,
+    /// The way being driven: which edge, whether from its second node to its first, and the node it leads to.
+    way: Vec<Point>,
+    edge: usize,
+    reversed: bool,
+    target: usize,
+    /// How far along the way the robot is: the leg, and the distance driven on it.
+    leg: usize,
+    driven_mm: f64,
+    heading_rad: f64,
+    at_node: Option<usize>,
+    sideways: Drift,
+    askew: Drift,
+}
+
+impl Simulation {
+    /// Puts the robot on the point of the Voronoi graph that is nearest to the plan's start.
+    ///
+    /// # Errors
+    /// When the plan has no true map.
+    pub fn new(plan: &Plan, model: RobotModel, seed: u64) -> Result<Self, VoronoiError> {
+        let map = TrueMap::of(plan)?;
+        let legs = map.edges.iter().enumerate().flat_map(|(edge, true_edge)| {
+            true_edge.way.windows(2).enumerate().map(move |(leg, ends)| (edge, leg, along(ends, plan.start())))
+        });
+        let gap_mm = |edge: usize, leg: usize, driven_mm: f64| {
+            let ends = &map.edges[edge].way[leg..leg + 2];
+            ends[0].towards(ends[1], driven_mm / ends[0].distance_mm(ends[1])).distance_mm(plan.start())
+        };
+        let nearest =
+            legs.min_by(|one, other| gap_mm(one.0, one.1, one.2).total_cmp(&gap_mm(other.0, other.1, other.2)));
+        let (edge, leg, driven_mm) = nearest.ok_or(VoronoiError::NoPlace)?;
+        let way = map.edges[edge].way.clone();
+        Ok(Self {
+            scene: Scene::new(plan),
+            target: map.edges[edge].nodes[1],
+            model,
+            random: Xoshiro256PlusPlus::seed_from_u64(seed),
+            frame_index: 0,
+            heading_rad: way[leg].direction_to(way[leg + 1]),
+            way,
+            edge,
+            reversed: false,
+            leg,
+            driven_mm,
+            map,
+            at_node: None,
+            sideways: Drift(0.0),
+            askew: Drift(0.0),
+        })
+    }
+
+    /// The building's true places and connections.
+    pub const fn true_map(&self) -> &TrueMap {
+        &self.map
+    }
+
+    /// Where the robot is now: beside its way and a little askew.
+    fn pose(&mut self) -> Pose {
+        let ends = &self.way[self.leg..self.leg + 2];
+        let on_way = ends[0].towards(ends[1], self.driven_mm / ends[0].distance_mm(ends[1]));
+        let share = 1.0 / (self.model.frames_per_s * self.model.deviation_s);
+        let sideways_mm = self.model.track_sd_mm * self.sideways.step(share, &mut self.random);
+        let askew_rad = self.model.heading_sd_rad * self.askew.step(share, &mut self.random);
+        let (sine, cosine) = self.heading_rad.sin_cos();
+        let position = Point::new(on_way.x_mm - sine * sideways_mm, on_way.y_mm + cosine * sideways_mm);
+        Pose { position, heading_rad: wrapped(self.heading_rad + askew_rad) }
+    }
+
+    /// Moves the robot on by the time between two frames.
+    fn step(&mut self) {
+        self.at_node = None;
+        let mut left_s = 1.0 / self.model.frames_per_s;
+        while left_s > 1e-9 {
+            let ends = &self.way[self.leg..self.leg + 2];
+            let leg_mm = ends[0].distance_mm(ends[1]);
+            let ahead_rad = ends[0].direction_to(ends[1]);
+            let turn_rad = wrapped(ahead_rad - self.heading_rad);
+            // Only at a node the way has a kink that the robot stops for.
+            if self.leg == 0 && self.driven_mm == 0.0 && turn_rad.abs() > 1e-6 {
+                let can_rad = self.model.turn_rad_per_s * left_s;
+                self.at_node = Some(self.node_behind());
+                self.heading_rad = wrapped(self.heading_rad + turn_rad.clamp(-can_rad, can_rad));
+                left_s -= turn_rad.abs().min(can_rad) / self.model.turn_rad_per_s;
+                continue;
+            }
+            self.heading_rad = ahead_rad;
+            let can_mm = self.model.speed_mm_per_s * left_s;
+            if self.driven_mm + can_mm < leg_mm {
+                self.driven_mm += can_mm;
+                return;
+            }
+            left_s -= (leg_mm - self.driven_mm) / self.model.speed_mm_per_s;
+            self.driven_mm = 0.0;
+            self.leg += 1;
+            if self.leg + 1 == self.way.len() {
+                self.at_node = Some(self.target);
+                self.choose();
+            }
+        }
+    }
+
+    /// The node the present way begins at.
+    fn node_behind(&self) -> usize {
+        self.map.edges[self.edge].nodes[usize::from(self.reversed)]
+    }
+
+    /// Chooses the way on from the node that was reached.
+    fn choose(&mut self) {
+        let here = self.target;
+        // Each edge from each of its ends that is here: a loop can be driven both ways.
+        let mut ways: Vec<(usize, bool)> = Vec::new();
+        for (index, edge) in self.map.edges.iter().enumerate() {
+            ways.extend(
+                edge.nodes.iter().zip([false, true]).filter(|(node, _)| **node == here).map(|(_, r)| (index, r)),
+            );
+        }
+        let u_turn = (self.edge, !self.reversed);
+        let onward: Vec<_> = ways.iter().copied().filter(|way| *way != u_turn).collect();
+        let turn_back = onward.is_empty() || self.random.random_bool(self.model.u_turn_share);
+        let (edge, reversed) = if turn_back { u_turn } else { onward[self.random.random_range(0..onward.len())] };
+        let TrueEdge { nodes, way } = &self.map.edges[edge];
+        self.way = if reversed { way.iter().rev().copied().collect() } else { way.clone() };
+        self.target = nodes[usize::from(!reversed)];
+        self.edge = edge;
+        self.reversed = reversed;
+        self.leg = 0;
+        self.driven_mm = 0.0;
+    }
+}
+
+/// How far along a leg the point nearest to another lies, in millimetres.
+fn along(ends: &[Point], point: Point) -> f64 {
+    let length_mm = ends[0].distance_mm(ends[1]);
+    let dot = (point.x_mm - ends[0].x_mm) * (ends[1].x_mm - ends[0].x_mm)
+        + (point.y_mm - ends[0].y_mm) * (ends[1].y_mm - ends[0].y_mm);
+    // Short of the leg's end, and not at its very beginning, which is where a robot at a node stands.
+    (dot / length_mm).clamp(1e-3 * length_mm, 0.999 * length_mm)
+}
+
+impl Iterator for Simulation {
+    type Item = (RingFrame<SONARS>, Truth);
+
+    fn next(&mut self) -> Option<Self::Item> {
+        let pose = self.pose();
+        let frame = self.scene.frame(&pose, &self.model.sonar, &mut self.random);
+        let truth = Truth { frame_index: self.frame_index, pose, node: self.at_node };
+        self.frame_index += 1;
+        self.step();
+        Some((frame, truth))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_robot_keeps_its_speed_and_stays_off_the_walls() {
+        let plan = Plan::built_in("flat").unwrap();
+        let truths: Vec<Truth> = Simulation::new(&plan, RobotModel::default().with_noise(0.0), 3)
+            .unwrap()
+            .map(|(_, truth)| truth)
+            .take(1500)
+            .collect();
+        for pair in truths.windows(2) {
+            let moved_mm = pair[0].pose.position.distance_mm(pair[1].pose.position);
+            assert!(moved_mm < 30.1, "{pair:?}");
+            assert!(!plan.is_wall_at(pair[1].pose.position));
+        }
+        assert!(truths.iter().any(|truth| truth.node.is_some()));
+    }
+
+    #[test]
+    fn the_robot_is_at_the_node_it_names() {
+        let plan = Plan::built_in("office").unwrap();
+        let mut simulation = Simulation::new(&plan, RobotModel::default().with_noise(0.0), 4).unwrap();
+        let map = simulation.true_map().clone();
+        for (_, truth) in simulation.by_ref().take(1500) {
+            if let Some(node) = truth.node {
+                assert!(map.nodes[node].position.distance_mm(truth.pose.position) < 31.0, "{truth:?}");
+            }
+        }
+    }
+}

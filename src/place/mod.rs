@@ -1,0 +1,256 @@
+//! The place detector: ring frames in, meet points of the generalised Voronoi graph out.
+//!
+//! A robot on the generalised Voronoi graph (Choset and Nagatani, the paper's section IV.A) has its two closest
+//! obstacles at equal range. Where a third comes as close it is at a *meet point*: a junction, a bend, or the end of a
+//! corridor, whose front wall is then as close as the walls beside. The common range is the place's fingerprint.
+//!
+//! Each sensor is smoothed by the median of its last three readings, so that one missed echo changes nothing. The
+//! closest obstacle is the nearest range of the ring, the next the nearest at least `separation_mrad` away from it, and
+//! so on. The *spread* is how much farther the third is than the first: it falls to the noise at the meet point and
+//! rises again behind it. A frame within `equidistance_mm` shows a meet point; enough of them confirm it; when they
+//! end, the place is reported once; the next is looked for after the spread has risen beyond `leave_mm`.
+//!
+//! The radius is the mean, over the (at most eight) confirming frames with the smallest spread, of the mean range of
+//! the equidistant obstacles. While the robot comes nearer to the third obstacle it draws away from the first two, so
+//! their mean is nearly constant around the meet point, and averaging over frames costs little bias.
+
+mod config;
+mod obstacles;
+
+pub use config::{PlaceConfig, PlaceConfigError};
+
+use crate::ring::{Echo, RingFrame, RingGeometry};
+use crate::{FaultCounters, FaultKind, Fingerprint};
+use obstacles::{DEAD, Meeting, SILENT};
+
+/// How many frames the radius is averaged over.
+const KEPT: usize = 8;
+/// Frames whose spread is this much above the smallest one do not count for the radius, in millimetres.
+const KEPT_SPREAD_MM: u16 = 30;
+
+/// A place that the robot has come by.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Place {
+    /// The radius of the largest obstacle-free disc around the meet point.
+    pub fingerprint: Fingerprint,
+    /// The frame in which the robot was closest to the meet point, counted from 0 since the start of the detector.
+    pub frame_index: u32,
+    /// In how many directions the way leads on between the equidistant obstacles, 1 at a dead end; `None` when the
+    /// frames disagree.
+    pub degree: Option<u8>,
+    /// The smallest spread of the equidistant obstacles, in millimetres: how well the place was seen.
+    pub spread_mm: u16,
+}
+
+/// A frame that shows a meet point.
+#[derive(Clone, Copy)]
+struct Sighting {
+    meeting: Meeting,
+    frame_index: u32,
+}
+
+impl Sighting {
+    /// Sorts behind every real sighting.
+    const NONE: Self = Self { meeting: Meeting { spread_mm: SILENT, radius_mm: 0, openings: 0 }, frame_index: 0 };
+}
+
+/// Turns the frames of a ring of `SONARS` sensors into places.
+///
+/// The ranges are taken from the robot's centre; add the radius of the ring if the sensors measure from its rim.
+/// Memory: about `6 · SONARS + 150` bytes. Time for each frame: `O(SONARS)`, at most six passes over the ring.
+pub struct PlaceDetector<const SONARS: usize> {
+    config: PlaceConfig,
+    geometry: RingGeometry<SONARS>,
+    started: bool,
+    /// The last two frames, as smoothing reads them.
+    earlier_mm: [[u16; SONARS]; 2],
+    frame_index: u32,
+    /// Whether the robot is still at the place that was reported last.
+    leaving: bool,
+    /// Frames that showed the meet point in sight.
+    sighted: u8,
+    /// Frames that spoke against the present state, less those that spoke for it.
+    against: u8,
+    /// The sightings with the smallest spread, best first.
+    kept: [Sighting; KEPT],
+    faults: FaultCounters,
+}
+
+impl<const SONARS: usize> PlaceDetector<SONARS> {
+    /// A detector that waits for [`start`](Self::start).
+    pub const fn new() -> Self {
+        Self {
+            config: PlaceConfig::DEFAULT,
+            geometry: RingGeometry { bearings_mrad: [0; SONARS] },
+            started: false,
+            earlier_mm: [[DEAD; SONARS]; 2],
+            frame_index: 0,
+            leaving: false,
+            sighted: 0,
+            against: 0,
+            kept: [Sighting::NONE; KEPT],
+            faults: FaultCounters::new(),
+        }
+    }
+
+    /// Forgets everything and starts at frame 0.
+    ///
+    /// The sensors may be given in any order; sensors that look the same way are one.
+    ///
+    /// # Errors
+    /// The first setting that is out of its range; the detector is then as it was.
+    pub fn start(&mut self, config: PlaceConfig, geometry: RingGeometry<SONARS>) -> Result<(), PlaceConfigError> {
+        config.check(SONARS)?;
+        if geometry.bearings_mrad.iter().any(|bearing_mrad| !(-3142..=3142).contains(bearing_mrad)) {
+            return Err(PlaceConfigError::Bearing);
+        }
+        self.config = config;
+        self.geometry = geometry;
+        self.started = true;
+        self.earlier_mm = [[DEAD; SONARS]; 2];
+        self.frame_index = 0;
+        self.leaving = false;
+        self.faults = FaultCounters::new();
+        self.forget();
+        Ok(())
+    }
+
+    /// Takes the next frame; gives a place when the robot has just been at one.
+    ///
+    /// A place is reported some frames after the robot was closest to it, and once for each visit. Before the start
+    /// nothing happens.
+    pub fn observe(&mut self, frame: &RingFrame<SONARS>) -> Option<Place> {
+        if !self.started {
+            return None;
+        }
+        let frame_index = self.frame_index;
+        self.frame_index = self.frame_index.saturating_add(1);
+        let ranges_mm = self.smooth(frame);
+        let live = ranges_mm.iter().filter(|range_mm| **range_mm != DEAD).count();
+        if live < usize::from(self.config.live_sensors_min) {
+            self.faults.count(FaultKind::RingBlind);
+            return None;
+        }
+        let meeting =
+            obstacles::meeting(&ranges_mm, &self.geometry, self.config.separation_mrad, self.config.equidistance_mm);
+        if self.leaving { self.leave(meeting) } else { self.look(Sighting { meeting, frame_index }) }
+    }
+
+    /// The faults seen since the start: blind frames, nonsense ranges, radii that no fingerprint holds.
+    pub const fn faults(&self) -> &FaultCounters {
+        &self.faults
+    }
+
+    /// The median of the last three readings of each sensor.
+    fn smooth(&mut self, frame: &RingFrame<SONARS>) -> [u16; SONARS] {
+        let mut now_mm = [DEAD; SONARS];
+        for (now_mm, echo) in now_mm.iter_mut().zip(frame.echoes) {
+            *now_mm = match echo {
+                Echo::Dead => DEAD,
+                Echo::Silence => SILENT,
+                Echo::Range { range_mm } if range_mm < self.config.range_min_mm => {
+                    self.faults.count(FaultKind::SonarNonsense);
+                    DEAD
+                }
+                Echo::Range { range_mm } if range_mm > self.config.range_max_mm => SILENT,
+                Echo::Range { range_mm } => range_mm,
+            };
+        }
+        let [before_mm, long_before_mm] = self.earlier_mm;
+        self.earlier_mm = [now_mm, before_mm];
+        let mut smooth_mm = now_mm;
+        for ((smooth_mm, before_mm), long_before_mm) in smooth_mm.iter_mut().zip(before_mm).zip(long_before_mm) {
+            *smooth_mm = match (*smooth_mm, before_mm, long_before_mm) {
+                (DEAD, _, _) => DEAD,
+                (now_mm, DEAD, DEAD) => now_mm,
+                // Of two the shorter: a sensor misses an obstacle more often than it invents one.
+                (now_mm, DEAD, other_mm) | (now_mm, other_mm, DEAD) => now_mm.min(other_mm),
+                (a, b, c) => a.min(b).max(a.max(b).min(c)),
+            };
+        }
+        smooth_mm
+    }
+
+    /// Waits until the robot has left the place that was reported.
+    fn leave(&mut self, meeting: Meeting) -> Option<Place> {
+        if meeting.spread_mm >= self.config.leave_mm {
+            self.against = self.against.saturating_add(1);
+        } else {
+            self.against = self.against.saturating_sub(1);
+        }
+        if self.against >= self.config.leave_frames {
+            self.leaving = false;
+            self.forget();
+        }
+        None
+    }
+
+    /// Looks for a meet point, and gathers its frames while it is in sight.
+    fn look(&mut self, sighting: Sighting) -> Option<Place> {
+        if sighting.meeting.spread_mm <= self.config.equidistance_mm {
+            self.sighted = self.sighted.saturating_add(1);
+            self.against = self.against.saturating_sub(1);
+            self.keep(sighting);
+        } else if self.sighted > 0 {
+            self.against = self.against.saturating_add(1);
+        }
+        let over = self.against >= self.config.leave_frames;
+        if self.sighted < self.config.confirm_frames {
+            if over {
+                self.forget();
+            }
+            return None;
+        }
+        if !over && self.sighted < self.config.settle_frames {
+            return None;
+        }
+        let place = self.place();
+        self.leaving = true;
+        self.forget();
+        place
+    }
+
+    /// Keeps a sighting among the best, in order of their spread.
+    fn keep(&mut self, sighting: Sighting) {
+        let mut carried = sighting;
+        for kept in &mut self.kept {
+            if carried.meeting.spread_mm < kept.meeting.spread_mm {
+                core::mem::swap(kept, &mut carried);
+            }
+        }
+    }
+
+    /// Forgets the sightings.
+    fn forget(&mut self) {
+        self.kept = [Sighting::NONE; KEPT];
+        self.sighted = 0;
+        self.against = 0;
+    }
+
+    /// The place that the kept sightings add up to.
+    fn place(&mut self) -> Option<Place> {
+        let [best, ..] = self.kept;
+        let limit_mm = best.meeting.spread_mm.saturating_add(KEPT_SPREAD_MM);
+        let close = self.kept.iter().map(|kept| kept.meeting).filter(|meeting| meeting.spread_mm <= limit_mm);
+        let (count, sum_mm) = close.clone().fold((0u32, 0u32), |(count, sum_mm), meeting| {
+            (count.saturating_add(1), sum_mm.saturating_add(u32::from(meeting.radius_mm)))
+        });
+        let radius_mm = sum_mm.saturating_add(count / 2).checked_div(count).unwrap_or(0) as u16;
+        let agreed = |degree: u8| close.clone().filter(|meeting| meeting.openings == degree).count() as u32;
+        let degree = (1..=6).find(|degree| agreed(*degree).saturating_mul(4) >= count.saturating_mul(3));
+        let Ok(fingerprint) = Fingerprint::from_radius_mm(radius_mm) else {
+            self.faults.count(FaultKind::RadiusOutOfRange);
+            return None;
+        };
+        Some(Place { fingerprint, frame_index: best.frame_index, degree, spread_mm: best.meeting.spread_mm })
+    }
+}
+
+impl<const SONARS: usize> Default for PlaceDetector<SONARS> {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,159 @@
+//! The place detector on frames made by hand: a corridor of 2 m and its end.
+
+use super::*;
+
+/// An even ring and a robot in a corridor 2 m wide that looks along it, with the end wall so far ahead. Each sensor
+/// sees what lies on its axis.
+fn corridor<const SONARS: usize>(end_mm: u16) -> (RingGeometry<SONARS>, RingFrame<SONARS>) {
+    let mut geometry = RingGeometry { bearings_mrad: [0; SONARS] };
+    let mut frame = RingFrame { echoes: [Echo::Silence; SONARS] };
+    for (sensor, (bearing_mrad, echo)) in geometry.bearings_mrad.iter_mut().zip(&mut frame.echoes).enumerate() {
+        let bearing = core::f64::consts::TAU * sensor as f64 / SONARS as f64;
+        let bearing = if bearing > core::f64::consts::PI { bearing - core::f64::consts::TAU } else { bearing };
+        *bearing_mrad = (bearing * 1000.0) as i16;
+        let side_mm = 1000.0 / bearing.sin().abs();
+        let front_mm = if bearing.cos() > 0.0 { f64::from(end_mm) / bearing.cos() } else { f64::INFINITY };
+        let range_mm = side_mm.min(front_mm);
+        if range_mm <= 6000.0 {
+            *echo = Echo::Range { range_mm: range_mm as u16 };
+        }
+    }
+    (geometry, frame)
+}
+
+fn started<const SONARS: usize>() -> PlaceDetector<SONARS> {
+    let mut detector = PlaceDetector::new();
+    detector.start(PlaceConfig::DEFAULT, corridor(6000).0).unwrap();
+    detector
+}
+
+/// Drives from 3 m before the end wall to the dead end's meet point, waits there, and drives back.
+fn in_and_out() -> impl Iterator<Item = u16> {
+    let way_in = (1000..3000).rev().step_by(30);
+    let way_out = (1000..3000).step_by(30);
+    way_in.chain([1000; 10]).chain(way_out)
+}
+
+fn places<const SONARS: usize>(detector: &mut PlaceDetector<SONARS>, frames: &[RingFrame<SONARS>]) -> Vec<Place> {
+    frames.iter().filter_map(|frame| detector.observe(frame)).collect()
+}
+
+fn a_dead_end_is_one_place<const SONARS: usize>() {
+    let frames: Vec<_> = in_and_out().map(|end_mm| corridor::<SONARS>(end_mm).1).collect();
+    let found = places(&mut started::<SONARS>(), &frames);
+    assert_eq!(found.len(), 1, "{found:?}");
+    assert!(found[0].fingerprint.radius_mm().abs_diff(1000) <= 10, "{found:?}");
+    assert_eq!(found[0].degree, Some(1));
+    assert!((66..80).contains(&found[0].frame_index), "{found:?}");
+}
+
+#[test]
+fn a_dead_end_is_one_place_to_rings_of_8_16_and_24() {
+    a_dead_end_is_one_place::<8>();
+    a_dead_end_is_one_place::<16>();
+    a_dead_end_is_one_place::<24>();
+}
+
+#[test]
+fn a_corridor_is_no_place() {
+    let frames = [corridor::<16>(6000).1; 200];
+    assert_eq!(places(&mut started::<16>(), &frames), []);
+}
+
+#[test]
+fn a_robot_that_stands_still_gets_one_place() {
+    let frames = [corridor::<16>(1000).1; 300];
+    assert_eq!(places(&mut started::<16>(), &frames).len(), 1);
+}
+
+#[test]
+fn flicker_between_frames_gives_one_place() {
+    let mut frames: Vec<_> = in_and_out().map(|end_mm| corridor::<16>(end_mm).1).collect();
+    for (number, frame) in frames.iter_mut().enumerate() {
+        match number % 5 {
+            1 => frame.echoes[0] = Echo::Silence,
+            3 => frame.echoes[4] = Echo::Dead,
+            _ => {}
+        }
+    }
+    assert_eq!(places(&mut started::<16>(), &frames).len(), 1);
+}
+
+#[test]
+fn one_meeting_frame_alone_is_no_place() {
+    let mut frames = [corridor::<16>(6000).1; 50];
+    frames[20] = corridor(1000).1;
+    assert_eq!(places(&mut started::<16>(), &frames), []);
+}
+
+#[test]
+fn any_one_dead_sensor_keeps_the_place() {
+    for dead in 0..16 {
+        let mut frames: Vec<_> = in_and_out().map(|end_mm| corridor::<16>(end_mm).1).collect();
+        frames.iter_mut().for_each(|frame| frame.echoes[dead] = Echo::Dead);
+        let found = places(&mut started::<16>(), &frames);
+        assert_eq!(found.len(), 1, "sensor {dead}");
+        assert!(found[0].fingerprint.radius_mm().abs_diff(1000) <= 50, "sensor {dead}: {found:?}");
+    }
+}
+
+#[test]
+fn a_ring_of_dead_sensors_is_blind_and_counted() {
+    let mut detector = started::<16>();
+    assert_eq!(places(&mut detector, &[RingFrame { echoes: [Echo::Dead; 16] }; 40]), []);
+    assert_eq!(detector.faults().of(FaultKind::RingBlind), 40);
+}
+
+#[test]
+fn blind_frames_in_the_middle_do_not_split_a_place() {
+    let mut frames: Vec<_> = in_and_out().map(|end_mm| corridor::<16>(end_mm).1).collect();
+    frames[70..74].fill(RingFrame { echoes: [Echo::Dead; 16] });
+    assert_eq!(places(&mut started::<16>(), &frames).len(), 1);
+}
+
+#[test]
+fn silence_all_around_is_no_place_and_no_fault() {
+    let mut detector = started::<16>();
+    assert_eq!(places(&mut detector, &[RingFrame { echoes: [Echo::Silence; 16] }; 40]), []);
+    assert_eq!(*detector.faults(), FaultCounters::new());
+}
+
+#[test]
+fn zero_ranges_are_nonsense_and_no_place() {
+    let mut detector = started::<16>();
+    assert_eq!(places(&mut detector, &[RingFrame { echoes: [Echo::Range { range_mm: 0 }; 16] }; 40]), []);
+    assert_eq!(detector.faults().of(FaultKind::SonarNonsense), 640);
+    assert_eq!(detector.faults().of(FaultKind::RingBlind), 40);
+}
+
+#[test]
+fn a_radius_that_no_fingerprint_holds_is_counted() {
+    let config = PlaceConfig { range_max_mm: 20_000, ..PlaceConfig::DEFAULT };
+    let mut detector = PlaceDetector::<16>::new();
+    detector.start(config, corridor(6000).0).unwrap();
+    assert_eq!(places(&mut detector, &[RingFrame { echoes: [Echo::Range { range_mm: 9000 }; 16] }; 100]), []);
+    assert_eq!(detector.faults().of(FaultKind::RadiusOutOfRange), 1);
+}
+
+#[test]
+fn the_longest_ranges_do_not_overflow() {
+    let config = PlaceConfig { range_max_mm: 65_534, leave_mm: u16::MAX, ..PlaceConfig::DEFAULT };
+    let mut detector = PlaceDetector::<16>::new();
+    detector.start(config, corridor(6000).0).unwrap();
+    assert_eq!(places(&mut detector, &[RingFrame { echoes: [Echo::Range { range_mm: 65_534 }; 16] }; 300]), []);
+    assert_eq!(detector.faults().of(FaultKind::RadiusOutOfRange), 1);
+}
+
+#[test]
+fn a_detector_that_was_not_started_says_nothing() {
+    let mut detector = PlaceDetector::<16>::new();
+    assert_eq!(places(&mut detector, &[corridor::<16>(1000).1; 100]), []);
+}
+
+#[test]
+fn a_bearing_beyond_half_a_turn_is_refused() {
+    let mut geometry = corridor::<16>(1000).0;
+    geometry.bearings_mrad[3] = 3143;
+    let refused = PlaceDetector::<16>::new().start(PlaceConfig::DEFAULT, geometry);
+    assert_eq!(refused, Err(PlaceConfigError::Bearing));
+}

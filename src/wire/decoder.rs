@@ -1,0 +1,326 @@
+//! Bytes to messages: a push decoder that takes whatever the line delivers.
+
+use core::fmt;
+
+use super::Message;
+use super::digest::CRC;
+use super::frame::{CRC_BYTES, FRAME_VERSION, HEADER_BYTES, MAX_RAW_BYTES};
+
+/// What came of the bytes that were fed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Progress<'bytes> {
+    /// All bytes are taken and no frame is complete yet.
+    NeedsMore,
+    /// One message is complete.
+    Message {
+        /// The number of its frame and how it follows on the frames before.
+        header: Header,
+        /// The message.
+        message: Message,
+        /// The bytes that were not read yet: feed them next.
+        rest: &'bytes [u8],
+    },
+    /// What lay between two zeros was no message; it was counted and dropped.
+    Error {
+        /// What was wrong.
+        error: DecodeError,
+        /// The bytes that were not read yet: feed them next.
+        rest: &'bytes [u8],
+    },
+}
+
+/// The header of a frame.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Header {
+    /// The number of the frame.
+    pub sequence: u16,
+    /// How the frame follows on those before.
+    pub arrival: Arrival,
+}
+
+/// How a frame follows on those before.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Arrival {
+    /// The first intact frame.
+    First,
+    /// The one that was due.
+    InOrder,
+    /// Frames in between are missing.
+    AfterGap {
+        /// How many.
+        lost: u16,
+    },
+    /// One of the last 64 numbers again: the frame was repeated or overtaken.
+    Late,
+    /// The sender has started anew.
+    Restart,
+}
+
+/// What a decoder has seen since it was made; every count saturates.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct DecoderCounters {
+    /// Messages that were handed out.
+    pub messages: u32,
+    /// Frames that are missing according to the sequence numbers (a frame that arrived corrupt is one of them).
+    pub lost: u32,
+    /// Frames of right shape with a wrong CRC.
+    pub corrupt: u32,
+    /// Frames that were cut short.
+    pub cut: u32,
+    /// Frames longer than any message.
+    pub too_long: u32,
+    /// Intact frames of another frame version.
+    pub unknown_version: u32,
+    /// Intact frames whose payload is none of the messages known here.
+    pub unknown_message: u32,
+}
+
+/// Takes the bytes of the serial line in pieces of any length and hands out the messages.
+///
+/// It never blocks and never reads beyond the frame that it hands out. Whatever goes wrong inside a frame, the next
+/// zero byte ends it, and the frame after is read as if nothing had happened. Memory: 160 bytes.
+///
+/// ```
+/// use toposlam::wire::{Decoder, Encoder, MAX_FRAME_BYTES, Message, Progress};
+/// let mut out = [0; MAX_FRAME_BYTES];
+/// let sent = Message::Edge { a: 1, b: 2, present: true };
+/// let mut bytes = Encoder::new(0).encode(&sent, &mut out)?;
+/// let mut decoder = Decoder::new();
+/// loop {
+///     match decoder.feed(bytes) {
+///         Progress::NeedsMore => break,
+///         Progress::Message { message, rest, .. } => {
+///             assert_eq!(message, sent);
+///             bytes = rest;
+///         }
+///         Progress::Error { error, rest } => {
+///             eprintln!("{error}");
+///             bytes = rest;
+///         }
+///     }
+/// }
+/// # Ok::<(), toposlam::wire::EncodeError>(())
+/// ```
+#[derive(Clone, Debug)]
+pub struct Decoder {
+    raw: [u8; MAX_RAW_BYTES],
+    length: usize,
+    /// How many bytes are left of the COBS block.
+    block_left: u8,
+    /// Whether a byte of the frame was seen.
+    begun: bool,
+    too_long: bool,
+    last_sequence: Option<u16>,
+    last_boot: Option<u32>,
+    counters: DecoderCounters,
+}
+
+impl Decoder {
+    /// Numbers that lie at most so far back are late frames, not a restart.
+    const LATE_WINDOW: u16 = 64;
+
+    /// A decoder that has seen nothing.
+    pub const fn new() -> Self {
+        Self {
+            raw: [0; MAX_RAW_BYTES],
+            length: 0,
+            block_left: 0,
+            begun: false,
+            too_long: false,
+            last_sequence: None,
+            last_boot: None,
+            counters: DecoderCounters {
+                messages: 0,
+                lost: 0,
+                corrupt: 0,
+                cut: 0,
+                too_long: 0,
+                unknown_version: 0,
+                unknown_message: 0,
+            },
+        }
+    }
+
+    /// What was seen so far.
+    pub const fn counters(&self) -> DecoderCounters {
+        self.counters
+    }
+
+    /// Takes bytes up to the end of the next frame. Call again with the rest until it says [`Progress::NeedsMore`].
+    pub fn feed<'bytes>(&mut self, bytes: &'bytes [u8]) -> Progress<'bytes> {
+        let mut rest = bytes;
+        while let Some((&byte, tail)) = rest.split_first() {
+            rest = tail;
+            if byte != 0 {
+                self.take(byte);
+                continue;
+            }
+            if !core::mem::take(&mut self.begun) {
+                continue;
+            }
+            let frame = self.finish();
+            self.length = 0;
+            self.block_left = 0;
+            self.too_long = false;
+            return match frame {
+                Ok((sequence, None)) => {
+                    self.pass_over(sequence);
+                    self.count(DecodeError::UnknownMessage);
+                    Progress::Error { error: DecodeError::UnknownMessage, rest }
+                }
+                Ok((sequence, Some(message))) => {
+                    let arrival = self.arrival(sequence, &message);
+                    bump(&mut self.counters.messages, 1);
+                    Progress::Message { header: Header { sequence, arrival }, message, rest }
+                }
+                Err(error) => {
+                    self.count(error);
+                    Progress::Error { error, rest }
+                }
+            };
+        }
+        Progress::NeedsMore
+    }
+
+    /// Takes one byte that is not zero.
+    fn take(&mut self, byte: u8) {
+        if self.block_left > 0 {
+            self.block_left -= 1;
+            self.push(byte);
+        } else {
+            if self.begun {
+                self.push(0);
+            }
+            self.block_left = byte.saturating_sub(1);
+        }
+        self.begun = true;
+    }
+
+    fn push(&mut self, byte: u8) {
+        match self.raw.get_mut(self.length) {
+            Some(slot) => {
+                *slot = byte;
+                self.length += 1;
+            }
+            None => self.too_long = true,
+        }
+    }
+
+    /// Judges what lies between two zeros: the sequence number and the message, unless it is one that is not known here.
+    fn finish(&self) -> Result<(u16, Option<Message>), DecodeError> {
+        if self.too_long {
+            return Err(DecodeError::TooLong);
+        }
+        let raw = self.raw.get(..self.length).unwrap_or(&[]);
+        let Some((body, crc)) = raw.split_last_chunk::<CRC_BYTES>() else {
+            return Err(DecodeError::Cut);
+        };
+        if self.block_left > 0 {
+            return Err(DecodeError::Cut);
+        }
+        if CRC.checksum(body) != u32::from_le_bytes(*crc) {
+            return Err(DecodeError::Corrupt);
+        }
+        let Some(([version, low, high], payload)) = body.split_first_chunk::<HEADER_BYTES>() else {
+            return Err(DecodeError::Cut);
+        };
+        if *version != FRAME_VERSION {
+            return Err(DecodeError::UnknownVersion { version: *version });
+        }
+        let sequence = u16::from_le_bytes([*low, *high]);
+        match postcard::take_from_bytes::<Message>(payload) {
+            Ok((message, [])) => Ok((sequence, Some(message))),
+            _ => Ok((sequence, None)),
+        }
+    }
+
+    /// Lets an unknown message count as received, so that a newer sender's do not look like lost frames. After a gap the
+    /// number stays as it was: the next message has to tell of the gap.
+    fn pass_over(&mut self, sequence: u16) {
+        if self.last_sequence.is_some_and(|last| last.wrapping_add(1) == sequence) {
+            self.last_sequence = Some(sequence);
+        }
+    }
+
+    fn arrival(&mut self, sequence: u16, message: &Message) -> Arrival {
+        let mut restart = false;
+        if let Message::Hello(hello) = message {
+            restart = self.last_boot.is_some_and(|boot| boot != hello.boot);
+            self.last_boot = Some(hello.boot);
+        }
+        let arrival = match self.last_sequence.map(|last| sequence.wrapping_sub(last)) {
+            None => Arrival::First,
+            Some(_) if restart => Arrival::Restart,
+            Some(1) => Arrival::InOrder,
+            Some(ahead @ 2..=0x7FFF) => Arrival::AfterGap { lost: ahead - 1 },
+            Some(ahead) if ahead.wrapping_neg() < Self::LATE_WINDOW => Arrival::Late,
+            Some(_) => Arrival::Restart,
+        };
+        if let Arrival::AfterGap { lost } = arrival {
+            bump(&mut self.counters.lost, u32::from(lost));
+        }
+        if arrival != Arrival::Late {
+            self.last_sequence = Some(sequence);
+        }
+        arrival
+    }
+
+    fn count(&mut self, error: DecodeError) {
+        let counters = &mut self.counters;
+        bump(
+            match error {
+                DecodeError::Corrupt => &mut counters.corrupt,
+                DecodeError::Cut => &mut counters.cut,
+                DecodeError::TooLong => &mut counters.too_long,
+                DecodeError::UnknownVersion { .. } => &mut counters.unknown_version,
+                DecodeError::UnknownMessage => &mut counters.unknown_message,
+            },
+            1,
+        );
+    }
+}
+
+impl Default for Decoder {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+fn bump(count: &mut u32, by: u32) {
+    *count = count.saturating_add(by);
+}
+
+/// Why the bytes between two zeros are no message.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum DecodeError {
+    /// The CRC is wrong.
+    Corrupt,
+    /// The frame ends too early.
+    Cut,
+    /// The frame is longer than any message.
+    TooLong,
+    /// The frame is intact and has a version that is not known here.
+    UnknownVersion {
+        /// The version of the frame.
+        version: u8,
+    },
+    /// The frame is intact and its payload is none of the messages known here (the sender may be newer).
+    UnknownMessage,
+}
+
+impl fmt::Display for DecodeError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Corrupt => f.write_str("the CRC of the frame is wrong"),
+            Self::Cut => f.write_str("the frame ends too early"),
+            Self::TooLong => f.write_str("the frame is longer than any message"),
+            Self::UnknownVersion { version } => {
+                write!(f, "the frame has version {version}, this listener knows {FRAME_VERSION}")
+            }
+            Self::UnknownMessage => f.write_str("the frame holds no message that this listener knows"),
+        }
+    }
+}
+
+impl core::error::Error for DecodeError {}

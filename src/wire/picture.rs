@@ -1,0 +1,177 @@
+//! The listener's side: the map as heard.
+
+use super::decoder::{Arrival, Header};
+use super::digest::rows_digest;
+use super::reporter::bit;
+use super::{Evidence, Health, Hello, Location, Message, Row};
+use crate::FaultKind;
+use crate::map::bits;
+
+/// The map as heard so far, and whether it is the robot's.
+///
+/// Any message may be missing, doubled or late: late ones are ignored, and what is missing comes round with the
+/// rolling picture. `V` has to be at least the robot's; 64 always is. Memory: 16 bytes for each vertex and about 160 bytes.
+#[derive(Clone, Debug)]
+pub struct Picture<const V: usize> {
+    vertices: u8,
+    labels: [(u16, u32); V],
+    neighbours: [u64; V],
+    /// The vertices whose label was heard.
+    labelled: u64,
+    /// The digest of the robot's map, unless a message was missed since it was heard.
+    digest: Option<u32>,
+    hello: Option<Hello>,
+    location: Option<Location>,
+    evidence: Option<Evidence>,
+    health: Option<Health>,
+    faults: [u32; FaultKind::ALL.len()],
+}
+
+impl<const V: usize> Picture<V> {
+    /// The picture of a listener who has heard nothing.
+    pub const fn new() -> Self {
+        const { assert!(V >= 1 && V <= 64, "a map holds 1 to 64 vertices") };
+        Self {
+            vertices: 0,
+            labels: [(0, 0); V],
+            neighbours: [0; V],
+            labelled: 0,
+            digest: None,
+            hello: None,
+            location: None,
+            evidence: None,
+            health: None,
+            faults: [0; FaultKind::ALL.len()],
+        }
+    }
+
+    /// Takes in one message. `Place` and `Ring` leave no trace here; a vertex beyond `V` is left out.
+    pub fn apply(&mut self, header: Header, message: &Message) {
+        match header.arrival {
+            Arrival::Late => return,
+            Arrival::AfterGap { .. } => self.digest = None,
+            Arrival::Restart => *self = Self::new(),
+            Arrival::First | Arrival::InOrder => {}
+        }
+        match *message {
+            Message::Hello(hello) => self.hello = Some(hello),
+            Message::Map { vertices, digest, .. } => {
+                self.resize(vertices);
+                self.digest = Some(digest);
+            }
+            Message::Vertex { vertex, radius_mm, visits } => self.set_label(vertex, radius_mm, visits),
+            Message::Edge { a, b, present } => self.set_edge(a, b, present),
+            Message::Row(Row { vertex, radius_mm, visits, neighbours }) => {
+                self.set_label(vertex, radius_mm, visits);
+                for other in 0..V as u8 {
+                    self.set_edge(vertex, other, neighbours & bit(other) != 0);
+                }
+            }
+            Message::Location(location) => self.location = Some(location),
+            Message::Evidence(evidence) => self.evidence = Some(evidence),
+            Message::Health(health) => self.health = Some(health),
+            Message::Fault { kind, count } => {
+                if let Some(slot) = self.faults.get_mut(usize::from(kind)) {
+                    *slot = count;
+                }
+            }
+            Message::Place { .. } | Message::Ring { .. } => {}
+        }
+    }
+
+    /// Whether the map heard so far is the robot's, as far as anyone can know: its digest is the one that the robot
+    /// sent last, and no frame was missed since. Cost: the CRC of 14 bytes a vertex.
+    pub fn is_converged(&self) -> bool {
+        self.digest == Some(rows_digest(self.vertices, (0..self.vertices).filter_map(|vertex| self.row(vertex))))
+    }
+
+    /// Whether the label of every vertex known to exist was heard. Edges may still be missing.
+    pub fn is_complete(&self) -> bool {
+        self.labelled == bit(self.vertices).wrapping_sub(1)
+    }
+
+    /// How many vertices the map has, as far as heard.
+    pub const fn vertices(&self) -> u8 {
+        self.vertices
+    }
+
+    /// All that was heard of a vertex; `None` while its label was not.
+    pub fn row(&self, vertex: u8) -> Option<Row> {
+        let &(radius_mm, visits) = self.labels.get(usize::from(vertex))?;
+        let neighbours = self.neighbours(vertex);
+        (self.labelled & bit(vertex) != 0).then_some(Row { vertex, radius_mm, visits, neighbours })
+    }
+
+    /// The neighbours of a vertex as a bit row; 0 for a vertex that the map does not have.
+    pub fn neighbours(&self, vertex: u8) -> u64 {
+        self.neighbours.get(usize::from(vertex)).copied().unwrap_or(0)
+    }
+
+    /// Every edge once, as pairs of vertices with the smaller number first.
+    pub fn edges(&self) -> impl Iterator<Item = (u8, u8)> + '_ {
+        (0..self.vertices).flat_map(move |a| bits(self.neighbours(a)).filter(move |&b| a <= b).map(move |b| (a, b)))
+    }
+
+    /// The last introduction of the robot.
+    pub const fn hello(&self) -> Option<Hello> {
+        self.hello
+    }
+
+    /// Where the robot was last.
+    pub const fn location(&self) -> Option<Location> {
+        self.location
+    }
+
+    /// The last evidence.
+    pub const fn evidence(&self) -> Option<Evidence> {
+        self.evidence
+    }
+
+    /// How the firmware was last.
+    pub const fn health(&self) -> Option<Health> {
+        self.health
+    }
+
+    /// How often a kind of fault was seen, as far as heard.
+    pub fn fault(&self, kind: FaultKind) -> u32 {
+        self.faults.get(kind as usize).copied().unwrap_or(0)
+    }
+
+    fn set_label(&mut self, vertex: u8, radius_mm: u16, visits: u32) {
+        if let Some(label) = self.labels.get_mut(usize::from(vertex)) {
+            *label = (radius_mm, visits);
+            self.labelled |= bit(vertex);
+            self.vertices = self.vertices.max(vertex.saturating_add(1));
+        }
+    }
+
+    fn set_edge(&mut self, a: u8, b: u8, present: bool) {
+        if usize::from(a.max(b)) >= V {
+            return;
+        }
+        for (from, to) in [(a, b), (b, a)] {
+            if let Some(row) = self.neighbours.get_mut(usize::from(from)) {
+                *row = if present { *row | bit(to) } else { *row & !bit(to) };
+            }
+        }
+        if present {
+            self.vertices = self.vertices.max(a.max(b).saturating_add(1));
+        }
+    }
+
+    /// Vertices that do not exist any more go with their edges.
+    fn resize(&mut self, vertices: u8) {
+        let kept = bit(vertices).wrapping_sub(1);
+        for (row, vertex) in self.neighbours.iter_mut().zip(0u8..) {
+            *row = if vertex < vertices { *row & kept } else { 0 };
+        }
+        self.labelled &= kept;
+        self.vertices = vertices.min(V as u8);
+    }
+}
+
+impl<const V: usize> Default for Picture<V> {
+    fn default() -> Self {
+        Self::new()
+    }
+}

@@ -1,0 +1,254 @@
+//! Successive states to messages: what has changed at once, and everything in turn.
+
+use core::fmt;
+
+use super::digest::{map_digest, row_of};
+use super::{Capacities, Evidence, Hello, Location, Message, Row};
+use crate::{FaultCounters, FaultKind, Map, Update};
+
+/// Decides what to send. It keeps what the listener was last told and hands each message to a callback, which says
+/// whether the transmit queue took it; it never waits.
+///
+/// A message that was refused counts as not sent: the change goes out with the next update or with the rolling
+/// picture, whichever comes first. Messages that are no state (`Place`, `Health`, `Ring`) the caller sends on its own.
+/// Memory: 16 bytes for each vertex and about 100 bytes.
+#[derive(Clone, Debug)]
+pub struct Reporter<const V: usize> {
+    hello: Hello,
+    ticks_per_hello: u16,
+    ticks_to_hello: u16,
+    vertices: u8,
+    labels: [(u16, u32); V],
+    neighbours: [u64; V],
+    location: Option<Location>,
+    faults: [u32; FaultKind::ALL.len()],
+    /// Whose turn it is in the rolling picture: a vertex, or one of the turns that follow the last vertex.
+    turn: u8,
+    fault_turn: u8,
+    refused: u32,
+}
+
+impl<const V: usize> Reporter<V> {
+    /// A reporter that has to be started.
+    pub const fn new() -> Self {
+        let capacities =
+            Capacities { vertices: 0, hypotheses: 0, history: 0, ngram_length: 0, fingerprint_step_mm: 0, sonars: 0 };
+        Self {
+            hello: Hello { protocol_version: 0, schema_hash: 0, boot: 0, seed: 0, capacities },
+            ticks_per_hello: 0,
+            ticks_to_hello: 0,
+            vertices: 0,
+            labels: [(0, 0); V],
+            neighbours: [0; V],
+            location: None,
+            faults: [0; FaultKind::ALL.len()],
+            turn: 0,
+            fault_turn: 0,
+            refused: 0,
+        }
+    }
+
+    /// Begins anew: nothing was told yet, and the next tick introduces the robot.
+    ///
+    /// The introduction is repeated with every `ticks_per_hello` ticks after that; 0 means with every tick.
+    pub fn start(&mut self, hello: Hello, ticks_per_hello: u16) {
+        self.hello = hello;
+        self.ticks_per_hello = ticks_per_hello;
+        self.ticks_to_hello = 0;
+        self.vertices = 0;
+        self.neighbours = [0; V];
+        self.location = None;
+        self.faults = [0; FaultKind::ALL.len()];
+        self.turn = 0;
+        self.fault_turn = 0;
+        self.refused = 0;
+    }
+
+    /// How many messages the queue refused since the start; saturates.
+    pub const fn refused(&self) -> u32 {
+        self.refused
+    }
+
+    /// After each place: sends what is new in the filter's best map, how large it is, where the robot is and why.
+    ///
+    /// A vertex of which several edges changed goes out as one `Row`, so that a change of the best hypothesis cannot
+    /// flood the line: at most 2 `V` + 3 messages. Cost: linear in the number of vertices.
+    pub fn update(&mut self, map: &Map<V>, update: &Update, mut send: impl FnMut(&Message) -> Result<(), QueueFull>) {
+        let told_vertices = self.vertices;
+        if map.vertices() < told_vertices {
+            self.forget_from(map.vertices());
+        }
+        let mut changed = map.vertices() != told_vertices;
+        for vertex in 0..map.vertices() {
+            let row = row_of(map, vertex);
+            if self.flips(&row).count_ones() > 1 {
+                changed = true;
+                self.send_row(row, &mut send);
+            } else if self.label_told(vertex) != Some((row.radius_mm, row.visits)) {
+                changed = true;
+                let Row { vertex, radius_mm, visits, .. } = row;
+                if self.send(&Message::Vertex { vertex, radius_mm, visits }, &mut send) {
+                    self.tell_label(&row);
+                }
+            }
+        }
+        for a in 0..map.vertices() {
+            let flips = self.flips(&row_of(map, a));
+            changed |= flips != 0;
+            // More than one is a row that the queue refused: the rolling picture has it.
+            if flips.count_ones() == 1 {
+                let b = flips.trailing_zeros() as u8;
+                let present = map.neighbours(a) & flips != 0;
+                if self.send(&Message::Edge { a, b, present }, &mut send) {
+                    self.tell_edge(a, b, present);
+                }
+            }
+        }
+        if changed {
+            self.send_size(map, &mut send);
+        }
+        let location = Location::from(update);
+        if self.location != Some(location) && self.send(&Message::Location(location), &mut send) {
+            self.location = Some(location);
+        }
+        self.send(&Message::Evidence(Evidence::from(update)), &mut send);
+    }
+
+    /// At a steady pace: sends the faults whose count has changed and the next piece of the rolling picture.
+    ///
+    /// The pieces are every vertex of the map, the size of the map, the location, and one fault that was ever seen. A
+    /// listener that hears the `vertices + 3` ticks of one round without a loss has converged. At most one message for
+    /// each kind of fault, a `Hello` and a piece.
+    pub fn tick(
+        &mut self,
+        map: &Map<V>,
+        faults: &FaultCounters,
+        mut send: impl FnMut(&Message) -> Result<(), QueueFull>,
+    ) {
+        if self.ticks_to_hello == 0 && self.send(&Message::Hello(self.hello), &mut send) {
+            self.ticks_to_hello = self.ticks_per_hello;
+        }
+        self.ticks_to_hello = self.ticks_to_hello.saturating_sub(1);
+        for kind in FaultKind::ALL {
+            if self.faults.get(kind as usize) != Some(&faults.of(kind)) {
+                self.send_fault(kind, faults.of(kind), &mut send);
+            }
+        }
+        let vertices = map.vertices();
+        let done = match self.turn.checked_sub(vertices) {
+            None => self.send_row(row_of(map, self.turn), &mut send),
+            Some(0) => self.send_size(map, &mut send),
+            Some(1) => self.location.is_none_or(|location| self.send(&Message::Location(location), &mut send)),
+            Some(_) => self.next_fault(faults).is_none_or(|kind| self.send_fault(kind, faults.of(kind), &mut send)),
+        };
+        if done {
+            self.turn = if self.turn >= vertices.saturating_add(2) { 0 } else { self.turn.saturating_add(1) };
+        }
+    }
+
+    fn send(&mut self, message: &Message, send: &mut impl FnMut(&Message) -> Result<(), QueueFull>) -> bool {
+        let taken = send(message).is_ok();
+        if !taken {
+            self.refused = self.refused.saturating_add(1);
+        }
+        taken
+    }
+
+    fn send_row(&mut self, row: Row, send: &mut impl FnMut(&Message) -> Result<(), QueueFull>) -> bool {
+        let taken = self.send(&Message::Row(row), send);
+        if taken {
+            self.tell_label(&row);
+            for vertex in 0..V as u8 {
+                self.tell_edge(row.vertex, vertex, row.neighbours & bit(vertex) != 0);
+            }
+        }
+        taken
+    }
+
+    fn send_size(&mut self, map: &Map<V>, send: &mut impl FnMut(&Message) -> Result<(), QueueFull>) -> bool {
+        let edges = map.edges().count() as u16;
+        let taken = self.send(&Message::Map { vertices: map.vertices(), edges, digest: map_digest(map) }, send);
+        if taken {
+            self.vertices = map.vertices();
+        }
+        taken
+    }
+
+    fn send_fault(
+        &mut self,
+        kind: FaultKind,
+        count: u32,
+        send: &mut impl FnMut(&Message) -> Result<(), QueueFull>,
+    ) -> bool {
+        let taken = self.send(&Message::Fault { kind: kind as u8, count }, send);
+        if let (true, Some(told)) = (taken, self.faults.get_mut(kind as usize)) {
+            *told = count;
+        }
+        taken
+    }
+
+    /// The next kind of fault, in rotation, that was seen at all.
+    fn next_fault(&mut self, faults: &FaultCounters) -> Option<FaultKind> {
+        let seen = |kind: &FaultKind| faults.of(*kind) > 0;
+        let after = FaultKind::ALL.into_iter().filter(seen).find(|&kind| kind as u8 >= self.fault_turn);
+        let kind = after.or_else(|| FaultKind::ALL.into_iter().find(seen))?;
+        self.fault_turn = (kind as u8).saturating_add(1);
+        Some(kind)
+    }
+
+    /// The edges to this vertex or a later one in which a row differs from what was told.
+    fn flips(&self, row: &Row) -> u64 {
+        let told = self.neighbours.get(usize::from(row.vertex)).copied().unwrap_or(0);
+        (row.neighbours ^ told) & !bit(row.vertex).wrapping_sub(1)
+    }
+
+    fn label_told(&self, vertex: u8) -> Option<(u16, u32)> {
+        if vertex < self.vertices { self.labels.get(usize::from(vertex)).copied() } else { None }
+    }
+
+    fn tell_label(&mut self, row: &Row) {
+        if let Some(label) = self.labels.get_mut(usize::from(row.vertex)) {
+            *label = (row.radius_mm, row.visits);
+        }
+    }
+
+    fn tell_edge(&mut self, a: u8, b: u8, present: bool) {
+        for (from, to) in [(a, b), (b, a)] {
+            if let Some(row) = self.neighbours.get_mut(usize::from(from)) {
+                *row = if present { *row | bit(to) } else { *row & !bit(to) };
+            }
+        }
+    }
+
+    /// A vertex that goes takes its edges along, here as with the listener.
+    fn forget_from(&mut self, vertices: u8) {
+        let kept = bit(vertices).wrapping_sub(1);
+        for (row, vertex) in self.neighbours.iter_mut().zip(0u8..) {
+            *row = if vertex < vertices { *row & kept } else { 0 };
+        }
+        self.vertices = vertices;
+    }
+}
+
+impl<const V: usize> Default for Reporter<V> {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+/// The bit of a vertex in a row; no bit from 64 on, so that `bit(v).wrapping_sub(1)` is every bit below `v`.
+pub(super) fn bit(vertex: u8) -> u64 {
+    1u64.checked_shl(u32::from(vertex)).unwrap_or(0)
+}
+
+/// The transmit queue has no room for a message.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct QueueFull;
+
+impl fmt::Display for QueueFull {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str("the transmit queue has no room for the message")
+    }
+}
+
+impl core::error::Error for QueueFull {}
