@@ -37,7 +37,7 @@ fn agrees(graph: &Graph, history_mm: &[f64], n: usize) -> Result<(), TestCaseErr
 }
 
 proptest! {
-    #![proptest_config(cases(3000))]
+    #![proptest_config(cases(2000))]
 
     #[test]
     fn distances_equal_the_enumeration_for_n_2_to_4((graph, history) in graph_and_history(40), n in 2_usize..=4) {
@@ -98,7 +98,7 @@ proptest! {
 }
 
 proptest! {
-    #![proptest_config(cases(400))]
+    #![proptest_config(cases(200))]
 
     #[test]
     fn n_grams_missing_from_a_complete_exploration_are_found(
