@@ -1,8 +1,11 @@
-//! Laptop side of toposlam: the simulated world, recordings, and pictures of maps.
+//! Laptop side of toposlam: the simulated world, recordings, the emulated robot, and pictures of maps.
 //!
 //! [`world`] stands in for a building and a robot with a ring of sonars, [`recording`] for a real one; both yield the
-//! ring frames that the core's place detector reads. [`picture`] draws a map over its floor plan.
+//! ring frames that the core's place detector reads. [`chip`] plays the sensors of that world to the firmware in the
+//! [`emulator`]. [`picture`] draws a map over its floor plan.
 
+pub mod chip;
+pub mod emulator;
 pub mod picture;
 pub mod recording;
 pub mod world;
