@@ -1,19 +1,249 @@
-//! The robot image: wires a board to the stages.
+//! The robot image for the STM32F405RG: sonar ring in, map updates out on USART1.
+//!
+//! It only wires the board to the stages; `docs/firmware.md` has the pins. The image is flashable as it is. In the
+//! emulator nothing but a fault uses semihosting.
 #![no_std]
 #![no_main]
-use cortex_m as _;
-use cortex_m_semihosting as _;
-use defmt_rtt as _;
-use static_cell as _;
-use stm32f4xx_hal as _;
-use toposlam as _;
 
-#[panic_handler]
-fn panic(_: &core::panic::PanicInfo) -> ! {
-    loop {}
+mod support;
+
+use core::cell::RefCell;
+
+use cortex_m::asm;
+use defmt_rtt as _;
+use embedded_hal::delay::DelayNs;
+use embedded_hal_nb::{nb, serial};
+use heapless::Deque;
+use static_cell::ConstStaticCell;
+use stm32f4xx_hal::{
+    pac,
+    prelude::*,
+    rcc::{self, Rcc},
+    serial::{Serial, Tx},
+};
+use toposlam::{
+    FaultCounters, FaultKind, Fingerprint,
+    reference::{self, Detector, Filter, HISTORY_WORDS, PARTICLES, SONARS, VERTICES},
+    sonar::{Sc18im700, SonarRing, Srf08Config, Srf08Ring},
+    wire::{Capacities, Encoder, Health, Hello, MAX_FRAME_BYTES, Message, QueueFull, Reporter},
+};
+
+const TRANSMIT_BYTES: usize = 2048;
+const BRIDGE_BAUD_AT_RESET: u32 = 9600;
+const BAUD: u32 = 115_200;
+const EMULATED_PAUSE_CYCLES: u32 = 2000;
+const FRAMES_PER_HELLO: u16 = 128;
+const FRAMES_PER_HEALTH: u32 = 256;
+/// Time for some 30 bytes on the line.
+const PACE_US: u32 = 2500;
+
+const CAPACITIES: Capacities = Capacities {
+    vertices: VERTICES as u8,
+    hypotheses: PARTICLES as u16,
+    history: (HISTORY_WORDS * 32) as u16,
+    ngram_length: reference::FILTER.ngram_length,
+    fingerprint_step_mm: Fingerprint::STEP_MM as u8,
+    sonars: SONARS as u8,
+};
+
+/// The bytes that wait for USART1, and the line itself.
+struct Transmitter {
+    queue: &'static mut Deque<u8, TRANSMIT_BYTES>,
+    line: Tx<pac::USART1>,
+    encoder: Encoder,
+    faults: FaultCounters,
+}
+
+impl Transmitter {
+    /// Queues a whole message, or drops it and counts that.
+    fn send(&mut self, message: &Message) -> Result<(), QueueFull> {
+        let mut bytes = [0; MAX_FRAME_BYTES];
+        let frame = self.encoder.encode(message, &mut bytes).map_err(|_| QueueFull)?;
+        if self.queue.capacity() - self.queue.len() < frame.len() {
+            self.faults.count(FaultKind::WireFull);
+            return Err(QueueFull);
+        }
+        for &byte in frame {
+            // There is room: it was just looked for.
+            let _ = self.queue.push_back(byte);
+        }
+        Ok(())
+    }
+
+    /// Hands over what the line takes at once; never waits.
+    fn pump(&mut self) {
+        while let Some(&byte) = self.queue.front() {
+            match serial::Write::write(&mut self.line, byte) {
+                Err(nb::Error::WouldBlock) => break,
+                // A byte that the line refuses is gone; the frame's checksum tells the listener.
+                Ok(()) | Err(nb::Error::Other(_)) => self.queue.pop_front(),
+            };
+        }
+    }
+}
+
+/// Waits for the sonars and uses the time to send.
+struct SendingDelay<'a> {
+    cycles_per_slice: u32,
+    transmitter: &'a RefCell<Transmitter>,
+}
+
+impl SendingDelay<'_> {
+    /// Short of the 87 us that a byte lasts at 115,200 baud.
+    const SLICES_PER_SECOND: u32 = 20_000;
+    const SLICE_NS: u32 = 1_000_000_000 / Self::SLICES_PER_SECOND;
+
+    fn pump(&self) {
+        if let Ok(mut transmitter) = self.transmitter.try_borrow_mut() {
+            transmitter.pump();
+        }
+    }
+}
+
+impl DelayNs for SendingDelay<'_> {
+    fn delay_ns(&mut self, nanoseconds: u32) {
+        for _ in 0..nanoseconds.div_ceil(Self::SLICE_NS) {
+            self.pump();
+            asm::delay(self.cycles_per_slice);
+        }
+        self.pump();
+    }
+}
+
+/// A UART that pauses before it says "nothing yet", so that a number of polls is a time.
+///
+/// Without the pause the emulator would do nothing but serve the polls, and bytes would reach it late.
+struct PausingUart<UART> {
+    uart: UART,
+    pause_cycles: u32,
+}
+
+impl<UART: serial::ErrorType> serial::ErrorType for PausingUart<UART> {
+    type Error = UART::Error;
+}
+
+impl<UART: serial::Read<u8>> serial::Read<u8> for PausingUart<UART> {
+    fn read(&mut self) -> nb::Result<u8, UART::Error> {
+        self.uart.read().inspect_err(|error| {
+            if matches!(error, nb::Error::WouldBlock) {
+                asm::delay(self.pause_cycles);
+            }
+        })
+    }
+}
+
+impl<UART: serial::Write<u8>> serial::Write<u8> for PausingUart<UART> {
+    fn write(&mut self, byte: u8) -> nb::Result<(), UART::Error> {
+        self.uart.write(byte)
+    }
+
+    fn flush(&mut self) -> nb::Result<(), UART::Error> {
+        self.uart.flush()
+    }
+}
+
+/// The small stages.
+struct Stages {
+    detector: Detector,
+    reporter: Reporter<VERTICES>,
 }
 
 #[cortex_m_rt::entry]
 fn main() -> ! {
-    loop {}
+    static STAGES: ConstStaticCell<Stages> =
+        ConstStaticCell::new(Stages { detector: Detector::new(), reporter: Reporter::new() });
+    static QUEUE: ConstStaticCell<Deque<u8, TRANSMIT_BYTES>> = ConstStaticCell::new(Deque::new());
+    static FILTER: ConstStaticCell<Filter> = ConstStaticCell::new(Filter::new());
+
+    let is_emulated = support::is_emulated();
+    let Some(device) = pac::Peripherals::take() else {
+        // They are taken here for the first time.
+        panic!()
+    };
+    let mut rcc = start_clock(device.RCC);
+    let port_a = device.GPIOA.split(&mut rcc);
+    let Ok(line) = Serial::<_, u8>::new(device.USART1, (port_a.pa9, port_a.pa10), BAUD.bps(), &mut rcc) else {
+        panic!()
+    };
+    let (line, _) = line.split();
+
+    // 4000 polls of 5 us: 20 ms. The emulator's far end may be slow to be scheduled, so there it is seconds.
+    let pause_cycles = if is_emulated { EMULATED_PAUSE_CYCLES } else { rcc.clocks.sysclk().raw() / 200_000 };
+    let poll_budget = if is_emulated { 400_000 } else { 4000 };
+    let bridge_pins = (port_a.pa2, port_a.pa3);
+    let Ok(uart) = Serial::<_, u8>::new(device.USART2, bridge_pins, BRIDGE_BAUD_AT_RESET.bps(), &mut rcc) else {
+        panic!()
+    };
+    let mut bridge = Sc18im700::new(PausingUart { uart, pause_cycles }, poll_budget);
+    let asked = bridge.set_baud_rate(BAUD);
+    let (uart, (Some(bridge_tx), Some(bridge_rx))) = bridge.release().uart.release() else { panic!() };
+    let Ok(uart) = Serial::<_, u8>::new(uart, (bridge_tx, bridge_rx), BAUD.bps(), &mut rcc) else { panic!() };
+    let mut bridge = Sc18im700::new(PausingUart { uart, pause_cycles }, poll_budget);
+    if let Err(error) = asked.and_then(|()| bridge.start()) {
+        defmt::warn!("the bridge to the sonars: {}", error);
+    }
+
+    let Stages { detector, reporter } = STAGES.take();
+    let queue = QUEUE.take();
+    let filter = FILTER.take();
+    if detector.start(reference::PLACE, reference::RING).is_err()
+        || filter.start(reference::FILTER, reference::SEED).is_err()
+    {
+        panic!()
+    }
+    reporter.start(Hello::new(0, reference::SEED, CAPACITIES), FRAMES_PER_HELLO);
+    // One zero, so that noise from the start does not spoil the first frame.
+    let _ = queue.push_back(0);
+    let transmitter = Transmitter { queue, line, encoder: Encoder::default(), faults: FaultCounters::new() };
+    let transmitter = RefCell::new(transmitter);
+
+    let cycles_per_slice = rcc.clocks.sysclk().raw() / SendingDelay::SLICES_PER_SECOND;
+    let delay = SendingDelay { cycles_per_slice, transmitter: &transmitter };
+    let mut pace = SendingDelay { cycles_per_slice, transmitter: &transmitter };
+    let Ok(mut ring) = Srf08Ring::<_, _, SONARS>::new(bridge, delay, Srf08Config::DEFAULT) else { panic!() };
+    let mut ring_faults = FaultCounters::new();
+    defmt::info!("{} sonars, clock {} Hz", SONARS, rcc.clocks.sysclk().raw());
+    let mut loop_count = 0_u32;
+    loop {
+        let frame = ring.read(&mut ring_faults);
+        if let Some(error) = ring.last_error() {
+            defmt::debug!("{}", error);
+        }
+        if let Ok(mut transmitter) = transmitter.try_borrow_mut() {
+            if let Some(place) = detector.observe(&frame) {
+                let update = filter.observe(place.fingerprint);
+                defmt::info!("place {} is vertex {}", update.place_index, update.vertex);
+                // A message that finds no room is counted, and the rolling picture makes up for it.
+                let _ = transmitter.send(&Message::Place {
+                    place_index: update.place_index,
+                    frame_index: place.frame_index,
+                    radius_mm: place.fingerprint.radius_mm(),
+                    degree: place.degree,
+                });
+                reporter.update(filter.map(), &update, |message| transmitter.send(message));
+            }
+            if loop_count % FRAMES_PER_HEALTH == 0 {
+                let _ = transmitter.send(&Message::Health(health(loop_count)));
+            }
+            let mut faults = ring_faults;
+            for more in [detector.faults(), filter.faults(), &transmitter.faults] {
+                faults.add(more);
+            }
+            reporter.tick(filter.map(), &faults, |message| transmitter.send(message));
+        }
+        // A ring that is not there answers at once; the line still gets its time.
+        pace.delay_us(PACE_US);
+        loop_count = loop_count.wrapping_add(1);
+    }
+}
+
+fn health(loop_count: u32) -> Health {
+    let stack_high_water_bytes = u32::try_from(support::stack_high_water_bytes()).unwrap_or(u32::MAX);
+    Health { loop_count, stack_high_water_bytes, ..Health::default() }
+}
+
+/// The internal 16 MHz oscillator, directly or, with the feature `pll`, multiplied to 168 MHz. The emulator has no PLL.
+fn start_clock(controller: pac::RCC) -> Rcc {
+    let config = rcc::Config::hsi();
+    controller.freeze(if cfg!(feature = "pll") { config.sysclk(168.MHz()) } else { config })
 }

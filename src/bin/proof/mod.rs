@@ -1,0 +1,262 @@
+//! Calls of every public function of the library, by module.
+
+use core::{
+    fmt::{self, Write},
+    hint::black_box,
+};
+
+use embedded_hal::{delay::DelayNs, i2c::Error as _, i2c::I2c};
+use embedded_hal_nb::{nb, serial};
+use static_cell::ConstStaticCell;
+use toposlam::{
+    Config, ConfigError, Consistency, Direction, FaultCounters, FaultKind, Fingerprint, FingerprintError, History, Map,
+    Ngram, NgramError, NgramLength, NgramTable, NgramsFull, PaperFilter, Prior, VerticesFull,
+    ring::{Echo, RingFrame},
+    sonar::{BridgeError, Sc18im700, SonarError, SonarRing, Srf08Config, Srf08ConfigError, Srf08Ring},
+};
+
+const PARTICLES: usize = 10;
+const VERTICES: usize = 16;
+const WORDS: usize = 8;
+
+/// A value that the optimiser knows nothing about.
+trait Opaque: Sized {
+    fn opaque(self) -> Self {
+        black_box(self)
+    }
+}
+
+impl<T> Opaque for T {}
+
+/// Takes text and forgets it.
+struct Nowhere;
+
+impl Write for Nowhere {
+    fn write_str(&mut self, text: &str) -> fmt::Result {
+        black_box(text);
+        if black_box(true) { Ok(()) } else { Err(fmt::Error) }
+    }
+}
+
+/// Formats an error; whether that worked does not matter here.
+fn show<ERROR: fmt::Display>(error: ERROR) {
+    let _ = black_box(write!(Nowhere, "{error}"));
+}
+
+pub(crate) fn fault() {
+    let mut counters = FaultCounters::new().opaque();
+    let other = FaultCounters::default().opaque();
+    for kind in FaultKind::ALL.opaque() {
+        counters.count(kind);
+        black_box(counters.of(kind));
+    }
+    counters.add(&other);
+    black_box(counters);
+}
+
+pub(crate) fn ring() {
+    black_box(Echo::Silence.opaque().range_mm());
+}
+
+struct AnyLine;
+
+#[derive(Debug, Clone, Copy)]
+struct LineError;
+
+impl serial::Error for LineError {
+    fn kind(&self) -> serial::ErrorKind {
+        serial::ErrorKind::Other
+    }
+}
+
+impl serial::ErrorType for AnyLine {
+    type Error = LineError;
+}
+
+fn any_outcome<T>(value: T) -> nb::Result<T, LineError> {
+    match black_box(0_u8) {
+        0 => Ok(value),
+        1 => Err(nb::Error::WouldBlock),
+        _ => Err(nb::Error::Other(LineError)),
+    }
+}
+
+impl serial::Read<u8> for AnyLine {
+    fn read(&mut self) -> nb::Result<u8, LineError> {
+        any_outcome(black_box(0))
+    }
+}
+
+impl serial::Write<u8> for AnyLine {
+    fn write(&mut self, byte: u8) -> nb::Result<(), LineError> {
+        black_box(byte);
+        any_outcome(())
+    }
+
+    fn flush(&mut self) -> nb::Result<(), LineError> {
+        any_outcome(())
+    }
+}
+
+struct AnyDelay;
+
+impl DelayNs for AnyDelay {
+    fn delay_ns(&mut self, nanoseconds: u32) {
+        black_box(nanoseconds);
+    }
+}
+
+pub(crate) fn sonar() {
+    let mut bridge = Sc18im700::new(AnyLine, black_box(100));
+    let report = |outcome: Result<(), BridgeError>| {
+        if let Err(error) = outcome {
+            black_box(error.kind());
+            show(error);
+        }
+    };
+    report(bridge.start());
+    report(bridge.set_baud_rate(black_box(9600)));
+    static READ: ConstStaticCell<[u8; 40]> = ConstStaticCell::new([0; 40]);
+    if let Some(read) = READ.try_take().and_then(|read| read.get_mut(..black_box(3))) {
+        report(bridge.read(black_box(1), read));
+        report(bridge.write_read(black_box(1), black_box(&[1, 2, 3]), read));
+        let written = black_box([5; 20]);
+        report(bridge.write(black_box(1), &written));
+        use embedded_hal::i2c::Operation::{Read, Write};
+        let mut operations = [Write(&written), Read(read), Write(&written)];
+        if let Some(operations) = operations.get_mut(..black_box(2)) {
+            report(bridge.transaction(black_box(1), operations));
+        }
+    }
+    let bridge = Sc18im700::new(bridge.release(), black_box(7));
+    let config = Srf08Config::default().opaque();
+    match Srf08Ring::<_, _, 16>::new(bridge, AnyDelay, config) {
+        Ok(mut ring) => {
+            let mut faults = FaultCounters::new();
+            let frame: RingFrame<16> = ring.read(&mut faults);
+            black_box((frame, faults));
+            if let Some(error) = ring.last_error() {
+                show::<SonarError>(error);
+                black_box(error.fault.kind());
+            }
+            black_box(ring.release().0.release());
+        }
+        Err(error) => show::<Srf08ConfigError>(error),
+    }
+}
+
+fn any_fingerprint() -> Fingerprint {
+    match Fingerprint::from_radius_mm(black_box(1200)) {
+        Ok(fingerprint) => fingerprint,
+        Err(error) => {
+            show::<FingerprintError>(error);
+            Fingerprint::MAX
+        }
+    }
+}
+
+fn any_length() -> NgramLength {
+    match NgramLength::new(black_box(5)) {
+        Ok(length) => length,
+        Err(error) => {
+            show::<NgramError>(error);
+            NgramLength::MIN
+        }
+    }
+}
+
+pub(crate) fn fingerprint_and_ngram() {
+    black_box(Fingerprint::from_steps(black_box(9)));
+    let (a, b) = (any_fingerprint(), any_fingerprint());
+    black_box((a.steps(), a.radius_mm(), a.distance_steps(b)));
+    let length = any_length();
+    black_box((length.get(), length.bits_per_label(), length.label_step_mm()));
+    let labels = [a; 9];
+    if let Some(labels) = labels.get(..black_box(5)) {
+        match Ngram::new(length, labels) {
+            Ok(ngram) => {
+                black_box(ngram.label(length, black_box(3)));
+                table(length, ngram);
+            }
+            Err(error) => show::<NgramError>(error),
+        }
+    }
+}
+
+fn table(length: NgramLength, ngram: Ngram) {
+    static TABLE: ConstStaticCell<NgramTable<WORDS>> = ConstStaticCell::new(NgramTable::new(NgramLength::MIN));
+    static HISTORY: ConstStaticCell<History<WORDS>> = ConstStaticCell::new(History::new());
+    let (Some(table), Some(history)) = (TABLE.try_take(), HISTORY.try_take()) else { return };
+    *table = black_box(NgramTable::new(length));
+    black_box((table.len(), table.is_empty(), table.length()));
+    if let Err(error) = table.insert(ngram) {
+        show::<NgramsFull>(error);
+    }
+    for _ in 0..black_box(3) {
+        black_box(history.push(any_fingerprint()));
+    }
+    if let Err(error) = table.extend(history) {
+        show::<NgramsFull>(error);
+    }
+    black_box(table.ngrams());
+    static MAP: ConstStaticCell<Map<VERTICES>> = ConstStaticCell::new(Map::new());
+    static CONSISTENCY: ConstStaticCell<Consistency<VERTICES, WORDS, 1>> = ConstStaticCell::new(Consistency::new());
+    let (Some(map), Some(consistency)) = (MAP.try_take(), CONSISTENCY.try_take()) else { return };
+    for direction in [Direction::TwoSided, Direction::MapToHistory, Direction::HistoryToMap].opaque() {
+        black_box(consistency.distance_steps(map, &*history, length, direction));
+        black_box(consistency.distance_steps(map, &*table, length, direction));
+    }
+    table.clear();
+}
+
+pub(crate) fn map_and_history() {
+    static MAP: ConstStaticCell<Map<VERTICES>> = ConstStaticCell::new(Map::new());
+    let Some(map) = MAP.try_take() else { return };
+    for _ in 0..black_box(3) {
+        if let Err(error) = map.add_vertex(any_fingerprint()) {
+            show::<VerticesFull>(error);
+        }
+    }
+    map.observe(black_box(1), any_fingerprint());
+    map.add_edge(black_box(1), black_box(2));
+    black_box((map.vertices(), map.label(black_box(1)), map.visits(black_box(1)), map.neighbours(black_box(1))));
+    black_box(map.labels());
+    for edge in map.edges() {
+        black_box(edge);
+    }
+    map.clear();
+    static HISTORY: ConstStaticCell<History<WORDS>> = ConstStaticCell::new(History::new());
+    let Some(history) = HISTORY.try_take() else { return };
+    for _ in 0..black_box(3) {
+        black_box(history.push(any_fingerprint()));
+    }
+    black_box((history.len(), history.is_empty(), history.newest(black_box(3))));
+    for fingerprint in history.iter() {
+        black_box(fingerprint);
+    }
+    history.clear();
+}
+
+pub(crate) fn filter() {
+    static FILTER: ConstStaticCell<PaperFilter<PARTICLES, VERTICES, WORDS>> = ConstStaticCell::new(PaperFilter::new());
+    static PRIOR: ConstStaticCell<Prior<VERTICES, WORDS>> = ConstStaticCell::new(Prior::new(NgramLength::MIN));
+    let Some(filter) = FILTER.try_take() else { return };
+    let Some(prior) = PRIOR.try_take() else { return };
+    if let Err(error) = filter.start(Config::default().opaque(), black_box(1)) {
+        show::<ConfigError>(error);
+    }
+    black_box(prior.ngrams());
+    if let Ok(ngram) = Ngram::new(any_length(), &[any_fingerprint(); 5]) {
+        black_box(prior.insert(ngram).is_ok());
+    }
+    let draws = black_box([7; PARTICLES]);
+    for _ in 0..black_box(3) {
+        let update = filter.observe(any_fingerprint());
+        black_box(update.factors.ln_weight_q16());
+        black_box(filter.observe_with_draws(any_fingerprint(), &draws));
+        black_box(filter.observe_with_prior(any_fingerprint(), prior));
+        black_box(filter.observe_with_prior_and_draws(any_fingerprint(), prior, &draws));
+        black_box(prior.extend(filter.history()).is_ok());
+    }
+    black_box((filter.best(), filter.particles(), filter.observed(), filter.faults(), filter.config(), filter.map()));
+}
