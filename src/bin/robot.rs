@@ -9,7 +9,11 @@ mod support;
 
 use core::cell::RefCell;
 
-use cortex_m::asm;
+use cortex_m::{
+    asm,
+    peripheral::{NVIC, syst::SystClkSource},
+};
+use cortex_m_rt::exception;
 use defmt_rtt as _;
 use embedded_hal::delay::DelayNs;
 use embedded_hal_nb::{nb, serial};
@@ -19,7 +23,7 @@ use stm32f4xx_hal::{
     pac,
     prelude::*,
     rcc::{self, Rcc},
-    serial::{Serial, Tx},
+    serial::{Event, Serial, Tx},
 };
 use toposlam::{
     FaultCounters, FaultKind, Fingerprint,
@@ -31,7 +35,6 @@ use toposlam::{
 const TRANSMIT_BYTES: usize = 2048;
 const BRIDGE_BAUD_AT_RESET: u32 = 9600;
 const BAUD: u32 = 115_200;
-const EMULATED_PAUSE_CYCLES: u32 = 2000;
 const FRAMES_PER_HELLO: u16 = 128;
 const FRAMES_PER_HEALTH: u32 = 256;
 /// Time for some 30 bytes on the line.
@@ -110,29 +113,34 @@ impl DelayNs for SendingDelay<'_> {
     }
 }
 
-/// A UART that pauses before it says "nothing yet", so that a number of polls is a time.
+/// A UART that waits a moment before it says "nothing yet", so that a number of polls is a time.
 ///
-/// Without the pause the emulator would do nothing but serve the polls, and bytes would reach it late.
-struct PausingUart<UART> {
+/// While it sends, the moment is short, for the receiver holds one byte only. Otherwise it sleeps until a byte arrives
+/// or the clock ticks; the emulator then has the time to bring the byte.
+struct SleepingUart<UART> {
     uart: UART,
-    pause_cycles: u32,
+    cycles_while_sending: u32,
 }
 
-impl<UART: serial::ErrorType> serial::ErrorType for PausingUart<UART> {
+impl<UART: serial::ErrorType> serial::ErrorType for SleepingUart<UART> {
     type Error = UART::Error;
 }
 
-impl<UART: serial::Read<u8>> serial::Read<u8> for PausingUart<UART> {
+impl<UART: serial::Read<u8> + serial::Write<u8>> serial::Read<u8> for SleepingUart<UART> {
     fn read(&mut self) -> nb::Result<u8, UART::Error> {
-        self.uart.read().inspect_err(|error| {
-            if matches!(error, nb::Error::WouldBlock) {
-                asm::delay(self.pause_cycles);
+        let answer = self.uart.read();
+        if matches!(answer, Err(nb::Error::WouldBlock)) {
+            if self.uart.flush().is_ok() {
+                sleep_until_a_byte_or_a_tick();
+            } else {
+                asm::delay(self.cycles_while_sending);
             }
-        })
+        }
+        answer
     }
 }
 
-impl<UART: serial::Write<u8>> serial::Write<u8> for PausingUart<UART> {
+impl<UART: serial::Write<u8>> serial::Write<u8> for SleepingUart<UART> {
     fn write(&mut self, byte: u8) -> nb::Result<(), UART::Error> {
         self.uart.write(byte)
     }
@@ -141,6 +149,24 @@ impl<UART: serial::Write<u8>> serial::Write<u8> for PausingUart<UART> {
         self.uart.flush()
     }
 }
+
+/// With interrupts off, a pending one still ends the sleep; so no byte slips in between the look and the sleep.
+fn sleep_until_a_byte_or_a_tick() {
+    cortex_m::interrupt::free(|_| {
+        // SAFETY: interrupts are off until it is masked again, so no handler runs.
+        #[allow(unsafe_code)]
+        unsafe {
+            NVIC::unmask(pac::Interrupt::USART2);
+        }
+        asm::wfi();
+        NVIC::mask(pac::Interrupt::USART2);
+        NVIC::unpend(pac::Interrupt::USART2);
+    });
+}
+
+/// Nothing but the end of a sleep.
+#[exception]
+fn SysTick() {}
 
 /// The small stages.
 struct Stages {
@@ -156,7 +182,7 @@ fn main() -> ! {
     static FILTER: ConstStaticCell<Filter> = ConstStaticCell::new(Filter::new());
 
     let is_emulated = support::is_emulated();
-    let Some(device) = pac::Peripherals::take() else {
+    let (Some(device), Some(mut core)) = (pac::Peripherals::take(), cortex_m::Peripherals::take()) else {
         // They are taken here for the first time.
         panic!()
     };
@@ -167,18 +193,24 @@ fn main() -> ! {
     };
     let (line, _) = line.split();
 
-    // 4000 polls of 5 us: 20 ms. The emulator's far end may be slow to be scheduled, so there it is seconds.
-    let pause_cycles = if is_emulated { EMULATED_PAUSE_CYCLES } else { rcc.clocks.sysclk().raw() / 200_000 };
-    let poll_budget = if is_emulated { 400_000 } else { 4000 };
+    // 200 polls are 4 ms while sending and 50 ms otherwise; the emulator's far end may be slow to be scheduled.
+    let clock_hz = rcc.clocks.sysclk().raw();
+    core.SYST.set_clock_source(SystClkSource::Core);
+    core.SYST.set_reload(if is_emulated { 0x00FF_FFFF } else { clock_hz / 4000 - 1 });
+    core.SYST.clear_current();
+    core.SYST.enable_interrupt();
+    core.SYST.enable_counter();
+    let bridge_on = |uart| Sc18im700::new(SleepingUart { uart, cycles_while_sending: clock_hz / 50_000 }, 200);
     let bridge_pins = (port_a.pa2, port_a.pa3);
     let Ok(uart) = Serial::<_, u8>::new(device.USART2, bridge_pins, BRIDGE_BAUD_AT_RESET.bps(), &mut rcc) else {
         panic!()
     };
-    let mut bridge = Sc18im700::new(PausingUart { uart, pause_cycles }, poll_budget);
+    let mut bridge = bridge_on(uart);
     let asked = bridge.set_baud_rate(BAUD);
     let (uart, (Some(bridge_tx), Some(bridge_rx))) = bridge.release().uart.release() else { panic!() };
-    let Ok(uart) = Serial::<_, u8>::new(uart, (bridge_tx, bridge_rx), BAUD.bps(), &mut rcc) else { panic!() };
-    let mut bridge = Sc18im700::new(PausingUart { uart, pause_cycles }, poll_budget);
+    let Ok(mut uart) = Serial::<_, u8>::new(uart, (bridge_tx, bridge_rx), BAUD.bps(), &mut rcc) else { panic!() };
+    uart.listen(Event::RxNotEmpty);
+    let mut bridge = bridge_on(uart);
     if let Err(error) = asked.and_then(|()| bridge.start()) {
         defmt::warn!("the bridge to the sonars: {}", error);
     }
