@@ -21,9 +21,10 @@ mod fingerprint;
 mod history;
 mod likelihood;
 mod map;
+#[cfg(feature = "wire")]
+mod mapper;
 mod ngram;
 pub mod place;
-pub mod reference;
 pub mod ring;
 pub mod sonar;
 #[cfg(feature = "wire")]
@@ -35,4 +36,6 @@ pub use filter::{Config, ConfigError, PaperFilter, Particle, Prior, Update, Weig
 pub use fingerprint::{Fingerprint, FingerprintError};
 pub use history::History;
 pub use map::{Map, VerticesFull};
+#[cfg(feature = "wire")]
+pub use mapper::{Mapper, MapperConfig, MapperError, ReferenceMapper};
 pub use ngram::{Ngram, NgramError, NgramLength, NgramTable, NgramsFull};

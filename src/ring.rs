@@ -37,3 +37,25 @@ pub struct RingGeometry<const SONARS: usize> {
     /// The bearing of each sensor in milliradians, −3142 to 3142, counter-clockwise positive, 0 straight ahead.
     pub bearings_mrad: [i16; SONARS],
 }
+
+impl<const SONARS: usize> RingGeometry<SONARS> {
+    /// Sensors at even spacing, the first one straight ahead, counter-clockwise.
+    ///
+    /// ```
+    /// use toposlam::ring::RingGeometry;
+    /// assert_eq!(RingGeometry::<4>::even().bearings_mrad, [0, 1571, -3141, -1571]);
+    /// ```
+    pub const fn even() -> Self {
+        const { assert!(SONARS > 0 && SONARS <= 128, "a ring has 1 to 128 sensors") };
+        const FULL_TURN_MRAD: usize = 6283;
+        let mut bearings_mrad = [0; SONARS];
+        let mut sensor = 0;
+        while sensor < SONARS {
+            let bearing_mrad = ((2 * sensor * FULL_TURN_MRAD + SONARS) / (2 * SONARS)) as i16;
+            bearings_mrad[sensor] =
+                if 2 * sensor < SONARS { bearing_mrad } else { bearing_mrad - FULL_TURN_MRAD as i16 };
+            sensor += 1;
+        }
+        Self { bearings_mrad }
+    }
+}

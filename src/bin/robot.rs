@@ -26,28 +26,18 @@ use stm32f4xx_hal::{
     serial::{Event, Serial, Tx},
 };
 use toposlam::{
-    FaultCounters, FaultKind, Fingerprint,
-    reference::{self, Detector, Filter, HISTORY_WORDS, PARTICLES, SONARS, VERTICES},
+    FaultCounters, FaultKind, MapperConfig, ReferenceMapper,
     sonar::{Sc18im700, SonarRing, Srf08Config, Srf08Ring},
-    wire::{Capacities, Encoder, Health, Hello, MAX_FRAME_BYTES, Message, QueueFull, Reporter},
+    wire::{Encoder, Health, MAX_FRAME_BYTES, Message, QueueFull},
 };
 
+const SONARS: usize = 16;
 const TRANSMIT_BYTES: usize = 2048;
 const BRIDGE_BAUD_AT_RESET: u32 = 9600;
 const BAUD: u32 = 115_200;
-const FRAMES_PER_HELLO: u16 = 128;
 const FRAMES_PER_HEALTH: u32 = 256;
 /// Time for some 30 bytes on the line.
 const PACE_US: u32 = 2500;
-
-const CAPACITIES: Capacities = Capacities {
-    vertices: VERTICES as u8,
-    hypotheses: PARTICLES as u16,
-    history: (HISTORY_WORDS * 32) as u16,
-    ngram_length: reference::FILTER.ngram_length,
-    fingerprint_step_mm: Fingerprint::STEP_MM as u8,
-    sonars: SONARS as u8,
-};
 
 /// The bytes that wait for USART1, and the line itself.
 struct Transmitter {
@@ -168,18 +158,10 @@ fn sleep_until_a_byte_or_a_tick() {
 #[exception]
 fn SysTick() {}
 
-/// The small stages.
-struct Stages {
-    detector: Detector,
-    reporter: Reporter<VERTICES>,
-}
-
 #[cortex_m_rt::entry]
 fn main() -> ! {
-    static STAGES: ConstStaticCell<Stages> =
-        ConstStaticCell::new(Stages { detector: Detector::new(), reporter: Reporter::new() });
     static QUEUE: ConstStaticCell<Deque<u8, TRANSMIT_BYTES>> = ConstStaticCell::new(Deque::new());
-    static FILTER: ConstStaticCell<Filter> = ConstStaticCell::new(Filter::new());
+    static MAPPER: ConstStaticCell<ReferenceMapper> = ConstStaticCell::new(ReferenceMapper::new());
 
     let is_emulated = support::is_emulated();
     let (Some(device), Some(mut core)) = (pac::Peripherals::take(), cortex_m::Peripherals::take()) else {
@@ -215,15 +197,11 @@ fn main() -> ! {
         defmt::warn!("the bridge to the sonars: {}", error);
     }
 
-    let Stages { detector, reporter } = STAGES.take();
-    let queue = QUEUE.take();
-    let filter = FILTER.take();
-    if detector.start(reference::PLACE, reference::RING).is_err()
-        || filter.start(reference::FILTER, reference::SEED).is_err()
-    {
+    let mapper = MAPPER.take();
+    if mapper.start(&MapperConfig::REFERENCE).is_err() {
         panic!()
     }
-    reporter.start(Hello::new(0, reference::SEED, CAPACITIES), FRAMES_PER_HELLO);
+    let queue = QUEUE.take();
     // One zero, so that noise from the start does not spoil the first frame.
     let _ = queue.push_back(0);
     let transmitter = Transmitter { queue, line, encoder: Encoder::default(), faults: FaultCounters::new() };
@@ -242,26 +220,15 @@ fn main() -> ! {
             defmt::debug!("{}", error);
         }
         if let Ok(mut transmitter) = transmitter.try_borrow_mut() {
-            if let Some(place) = detector.observe(&frame) {
-                let update = filter.observe(place.fingerprint);
+            let mut faults = ring_faults;
+            faults.add(&transmitter.faults);
+            if let Some((_, update)) = mapper.observe(&frame, &faults, |message| transmitter.send(message)) {
                 defmt::info!("place {} is vertex {}", update.place_index, update.vertex);
-                // A message that finds no room is counted, and the rolling picture makes up for it.
-                let _ = transmitter.send(&Message::Place {
-                    place_index: update.place_index,
-                    frame_index: place.frame_index,
-                    radius_mm: place.fingerprint.radius_mm(),
-                    degree: place.degree,
-                });
-                reporter.update(filter.map(), &update, |message| transmitter.send(message));
             }
             if loop_count % FRAMES_PER_HEALTH == 0 {
+                // A message that finds no room is counted; the next one comes.
                 let _ = transmitter.send(&Message::Health(health(loop_count)));
             }
-            let mut faults = ring_faults;
-            for more in [detector.faults(), filter.faults(), &transmitter.faults] {
-                faults.add(more);
-            }
-            reporter.tick(filter.map(), &faults, |message| transmitter.send(message));
         }
         // A ring that is not there answers at once; the line still gets its time.
         pace.delay_us(PACE_US);

@@ -49,6 +49,19 @@ impl PlaceConfig {
         live_sensors_min: 6,
     };
 
+    /// What a detector holds before it is started: all zero.
+    pub(super) const UNSET: Self = Self {
+        equidistance_mm: 0,
+        leave_mm: 0,
+        separation_mrad: 0,
+        confirm_frames: 0,
+        leave_frames: 0,
+        settle_frames: 0,
+        range_min_mm: 0,
+        range_max_mm: 0,
+        live_sensors_min: 0,
+    };
+
     /// Whether every field is in its range for a ring of this many sensors.
     ///
     /// # Errors

@@ -36,20 +36,22 @@ pub struct Place {
     /// The frame in which the robot was closest to the meet point, counted from 0 since the start of the detector.
     pub frame_index: u32,
     /// In how many directions the way leads on between the equidistant obstacles, 1 at a dead end; `None` when the
-    /// frames disagree.
+    /// frames disagree. A way that ends within twice the radius is not seen as one, and neither is one between two
+    /// obstacles that are closer in bearing than `separation_mrad`.
     pub degree: Option<u8>,
     /// The smallest spread of the equidistant obstacles, in millimetres: how well the place was seen.
     pub spread_mm: u16,
 }
 
 /// A frame that shows a meet point.
-#[derive(Clone, Copy)]
+#[derive(Clone, Copy, Debug)]
 struct Sighting {
     meeting: Meeting,
     frame_index: u32,
 }
 
 impl Sighting {
+    const UNSET: Self = Self { meeting: Meeting { spread_mm: 0, radius_mm: 0, openings: 0 }, frame_index: 0 };
     /// Sorts behind every real sighting.
     const NONE: Self = Self { meeting: Meeting { spread_mm: SILENT, radius_mm: 0, openings: 0 }, frame_index: 0 };
 }
@@ -57,7 +59,8 @@ impl Sighting {
 /// Turns the frames of a ring of `SONARS` sensors into places.
 ///
 /// The ranges are taken from the robot's centre; add the radius of the ring if the sensors measure from its rim.
-/// Memory: about `6 · SONARS + 150` bytes. Time for each frame: `O(SONARS)`, at most six passes over the ring.
+/// Memory: about `6 · SONARS + 160` bytes. Time for each frame: `O(SONARS)`, at most six passes over the ring.
+#[derive(Clone, Debug)]
 pub struct PlaceDetector<const SONARS: usize> {
     config: PlaceConfig,
     geometry: RingGeometry<SONARS>,
@@ -77,10 +80,10 @@ pub struct PlaceDetector<const SONARS: usize> {
 }
 
 impl<const SONARS: usize> PlaceDetector<SONARS> {
-    /// A detector that waits for [`start`](Self::start).
+    /// A detector that waits for [`start`](Self::start); all zero, so that a `static` of it lies in `.bss`.
     pub const fn new() -> Self {
         Self {
-            config: PlaceConfig::DEFAULT,
+            config: PlaceConfig::UNSET,
             geometry: RingGeometry { bearings_mrad: [0; SONARS] },
             started: false,
             earlier_mm: [[DEAD; SONARS]; 2],
@@ -88,7 +91,7 @@ impl<const SONARS: usize> PlaceDetector<SONARS> {
             leaving: false,
             sighted: 0,
             against: 0,
-            kept: [Sighting::NONE; KEPT],
+            kept: [Sighting::UNSET; KEPT],
             faults: FaultCounters::new(),
         }
     }

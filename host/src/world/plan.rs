@@ -187,15 +187,13 @@ fn runs(lines: i32, length: i32, sides: impl Fn(i32, i32) -> (bool, bool)) -> Ve
         for place in 0..=length {
             let (before, behind) = sides(line, place);
             let side = (place < length && before != behind).then_some(before);
-            if let Some((from, was)) = begun
-                && side != Some(was)
-            {
-                found.push((line, from, place));
-                begun = None;
-            }
-            if let (None, Some(side)) = (begun, side) {
-                begun = Some((place, side));
-            }
+            begun = match begun {
+                Some((from, was)) if side == Some(was) => Some((from, was)),
+                _ => {
+                    found.extend(begun.map(|(from, _)| (line, from, place)));
+                    side.map(|side| (place, side))
+                }
+            };
         }
     }
     found

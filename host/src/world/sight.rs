@@ -180,7 +180,7 @@ mod tests {
 
     fn closet() -> Scene {
         let row = ".".repeat(16);
-        let rows = vec![row.as_str(); 7].join("\n");
+        let rows = [row.as_str(); 7].join("\n");
         Scene::new(&Plan::parse(&format!("cell_mm 250\n{}S\n{rows}", ".".repeat(15))).unwrap())
     }
 

@@ -37,7 +37,7 @@ pub struct Truth {
     pub node: Option<usize>,
 }
 
-/// How the robot drives and what its sonars are worth.
+/// How the robot drives and what its sonars are worth. Speeds, rates and times must be above 0.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RobotModel {
     /// Speed, in millimetres a second. Default 300.

@@ -1,0 +1,138 @@
+//! How right a map is, compared with the smallest equivalent of the traversed environment.
+
+use super::graph::Graph;
+use std::collections::BTreeSet;
+
+/// The scores of one map. A map vertex stands for the class it was mostly visited at.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct MapScore {
+    /// The vertices match the classes one to one and the edges are the same.
+    pub exact: bool,
+    /// The map without its labels is the true graph without its labels.
+    pub isomorphic: bool,
+    /// Harmonic mean of precision and recall of the pairs of classes that the map connects: `2 c / (m + t)` with `m`
+    /// pairs in the map, `t` in truth and `c` in both. A class that the map holds twice does not count against it here.
+    pub edge_f1: f64,
+    /// The share of all steps at which the vertex that the path visits stands for the class the robot was at.
+    pub location: f64,
+}
+
+/// Scores a map against the truth.
+///
+/// `path` is the map vertex of every step, `classes` the true class of every step. When a vertex was visited at two
+/// classes equally often, the lower class wins.
+///
+/// # Panics
+/// When the path visits a vertex that the map does not have, or a class that the truth does not have.
+pub fn score_map(map: &Graph, path: &[usize], truth: &Graph, classes: &[usize]) -> MapScore {
+    let class_of_vertex = majority_classes(map.vertex_count(), truth.vertex_count(), path, classes);
+    // The image of the map's edges. A vertex that was never visited stands for nothing.
+    let image: BTreeSet<(usize, usize)> = map
+        .edges()
+        .iter()
+        .filter_map(|&(a, b)| Some((class_of_vertex[a]?, class_of_vertex[b]?)))
+        .map(|(a, b)| (a.min(b), a.max(b)))
+        .collect();
+    let hit: BTreeSet<usize> = class_of_vertex.iter().copied().flatten().collect();
+    // With as many vertices as classes, hitting every class makes the match one to one.
+    let one_to_one = map.vertex_count() == truth.vertex_count() && hit.len() == truth.vertex_count();
+    let common = image.intersection(truth.edges()).count();
+    let pairs = image.len() + truth.edges().len();
+    let right = path.iter().zip(classes).filter(|&(&vertex, &class)| class_of_vertex[vertex] == Some(class)).count();
+    MapScore {
+        exact: one_to_one && image == *truth.edges(),
+        isomorphic: map.is_isomorphic_to(truth),
+        edge_f1: if pairs == 0 { 1.0 } else { 2.0 * common as f64 / pairs as f64 },
+        location: if path.is_empty() { 0.0 } else { right as f64 / path.len() as f64 },
+    }
+}
+
+/// Whether the last vertex of a path stands for the class the robot is at, judged by the path so far alone.
+pub fn is_localised(path: &[usize], classes: &[usize]) -> bool {
+    let (Some(&vertex), Some(&class)) = (path.last(), classes.last()) else { return false };
+    let class_count = classes.iter().max().map_or(0, |last| last + 1);
+    let visits = path.iter().zip(classes).filter(|&(&visited, _)| visited == vertex).map(|(_, &class)| class);
+    most_frequent(visits, class_count) == Some(class)
+}
+
+fn majority_classes(vertices: usize, class_count: usize, path: &[usize], classes: &[usize]) -> Vec<Option<usize>> {
+    let mut visited_at = vec![Vec::new(); vertices];
+    for (&vertex, &class) in path.iter().zip(classes) {
+        visited_at[vertex].push(class);
+    }
+    visited_at.into_iter().map(|visits| most_frequent(visits.into_iter(), class_count)).collect()
+}
+
+/// The most frequent class, the lowest of several; `None` without visits.
+fn most_frequent(visits: impl Iterator<Item = usize>, class_count: usize) -> Option<usize> {
+    let mut counts = vec![0_usize; class_count];
+    visits.for_each(|class| counts[class] += 1);
+    let (class, &count) = counts.iter().enumerate().rev().max_by_key(|&(_, count)| count)?;
+    (count > 0).then_some(class)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The truth: a triangle with a tail, 0-1-2-0 and 2-3.
+    fn truth() -> Graph {
+        Graph::from_edges(4, [(0, 1), (1, 2), (0, 2), (2, 3)])
+    }
+
+    const CLASSES: [usize; 8] = [0, 1, 2, 3, 2, 0, 1, 2];
+
+    #[test]
+    fn a_renumbered_truth_is_exact() {
+        // 0 -> 2, 1 -> 0, 2 -> 3, 3 -> 1
+        let map = Graph::from_edges(4, [(2, 0), (0, 3), (2, 3), (3, 1)]);
+        let score = score_map(&map, &[2, 0, 3, 1, 3, 2, 0, 3], &truth(), &CLASSES);
+        assert_eq!(score, MapScore { exact: true, isomorphic: true, edge_f1: 1.0, location: 1.0 });
+    }
+
+    #[test]
+    fn one_wrong_visit_costs_location_but_not_the_map() {
+        let score = score_map(&truth(), &[0, 1, 2, 3, 2, 0, 1, 1], &truth(), &CLASSES);
+        assert_eq!(score, MapScore { exact: true, isomorphic: true, edge_f1: 1.0, location: 7.0 / 8.0 });
+    }
+
+    #[test]
+    fn a_missing_edge_is_not_exact() {
+        let map = Graph::from_edges(4, [(0, 1), (1, 2), (2, 3)]);
+        let score = score_map(&map, &CLASSES, &truth(), &CLASSES);
+        assert_eq!(score, MapScore { exact: false, isomorphic: false, edge_f1: 6.0 / 7.0, location: 1.0 });
+    }
+
+    #[test]
+    fn the_right_graph_on_the_wrong_places_is_isomorphic_but_not_exact() {
+        // The tail hangs off place 0 instead of place 2.
+        let map = Graph::from_edges(4, [(0, 1), (1, 2), (0, 2), (0, 3)]);
+        let score = score_map(&map, &CLASSES, &truth(), &CLASSES);
+        assert_eq!(score, MapScore { exact: false, isomorphic: true, edge_f1: 6.0 / 8.0, location: 1.0 });
+    }
+
+    #[test]
+    fn a_place_held_twice_is_not_exact_even_when_all_its_edges_are_right() {
+        // Vertex 4 is place 2 once more.
+        let map = Graph::from_edges(5, [(0, 1), (1, 2), (0, 2), (2, 3), (3, 4), (0, 4)]);
+        let score = score_map(&map, &[0, 1, 2, 3, 4, 0, 1, 2], &truth(), &CLASSES);
+        assert_eq!(score, MapScore { exact: false, isomorphic: false, edge_f1: 1.0, location: 1.0 });
+    }
+
+    #[test]
+    fn two_places_in_one_vertex_are_not_one_to_one_even_when_the_count_agrees() {
+        // Vertices 0 and 3 both stand for place 0; place 3 has no vertex of its own and is taken for place 2.
+        let map = Graph::from_edges(4, [(0, 1), (1, 2), (2, 2), (2, 3), (1, 3)]);
+        let score = score_map(&map, &[0, 1, 2, 2, 2, 3, 1, 2], &truth(), &CLASSES);
+        assert!(!score.exact);
+        assert_eq!(score.location, 7.0 / 8.0);
+    }
+
+    #[test]
+    fn localisation_is_judged_by_the_majority_so_far() {
+        assert!(is_localised(&[0], &[3]));
+        assert!(is_localised(&[0, 1, 0], &[3, 2, 3]));
+        // Twice at class 3, now at class 1 in the same vertex.
+        assert!(!is_localised(&[0, 1, 0, 1, 0], &[3, 2, 3, 2, 1]));
+    }
+}

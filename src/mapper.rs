@@ -1,0 +1,139 @@
+//! The whole way on the robot: ring frame → place → hypotheses → map update → wire.
+
+use crate::place::{Place, PlaceConfig, PlaceConfigError, PlaceDetector};
+use crate::ring::{RingFrame, RingGeometry};
+use crate::wire::{Capacities, Hello, Message, QueueFull, Reporter};
+use crate::{Config, ConfigError, FaultCounters, Fingerprint, Map, PaperFilter, Update};
+use core::fmt;
+
+/// How often the robot introduces itself, in ring frames.
+const FRAMES_PER_HELLO: u16 = 100;
+
+/// The settings of every stage.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct MapperConfig<const SONARS: usize> {
+    /// Where the sonars look.
+    pub geometry: RingGeometry<SONARS>,
+    /// The place detector.
+    pub place: PlaceConfig,
+    /// The filter.
+    pub filter: Config,
+    /// The seed of the filter's random draws.
+    pub seed: u64,
+    /// A number that differs from one start of the robot to the next; 0 when it has none.
+    pub boot: u32,
+}
+
+impl MapperConfig<16> {
+    /// The settings of the reference robot, in its firmware and wherever a host repeats what the firmware does.
+    pub const REFERENCE: Self =
+        Self { geometry: RingGeometry::even(), place: PlaceConfig::DEFAULT, filter: Config::DEFAULT, seed: 1, boot: 0 };
+}
+
+/// The stages from the ring frame to the messages of the wire, in one piece of fixed memory: a ring of `SONARS`, and a
+/// filter of `N` particles with maps of `V` vertices and `32 · WORDS` places of history.
+///
+/// The firmware and a simulation on a host run this same code, and the same frames give the same messages.
+#[derive(Clone, Debug)]
+pub struct Mapper<const SONARS: usize, const N: usize, const V: usize, const WORDS: usize> {
+    detector: PlaceDetector<SONARS>,
+    filter: PaperFilter<N, V, WORDS>,
+    reporter: Reporter<V>,
+}
+
+/// The mapper of the reference robot: 16 sonars, 10 particles, maps of 16 vertices, 256 places of history.
+pub type ReferenceMapper = Mapper<16, 10, 16, 8>;
+
+impl<const SONARS: usize, const N: usize, const V: usize, const WORDS: usize> Mapper<SONARS, N, V, WORDS> {
+    /// A mapper that waits for [`Mapper::start`]; all zero, so that a `static` of it lies in `.bss`.
+    pub const fn new() -> Self {
+        Self { detector: PlaceDetector::new(), filter: PaperFilter::new(), reporter: Reporter::new() }
+    }
+
+    /// Forgets everything and starts anew.
+    ///
+    /// # Errors
+    /// [`MapperError`] names the first setting that is out of its range; the mapper must then be started again.
+    pub fn start(&mut self, config: &MapperConfig<SONARS>) -> Result<(), MapperError> {
+        self.detector.start(config.place, config.geometry).map_err(MapperError::Place)?;
+        self.filter.start(config.filter, config.seed).map_err(MapperError::Filter)?;
+        let capacities = Capacities {
+            vertices: V as u8,
+            hypotheses: config.filter.particles.into(),
+            history: (32 * WORDS) as u16,
+            ngram_length: config.filter.ngram_length,
+            fingerprint_step_mm: Fingerprint::STEP_MM as u8,
+            sonars: SONARS as u8,
+        };
+        self.reporter.start(Hello::new(config.boot, config.seed, capacities), FRAMES_PER_HELLO);
+        Ok(())
+    }
+
+    /// Takes one frame of the ring; gives the place and the update when the robot has just been at one. `sonar_faults`
+    /// are those of the ring's driver so far. Every message goes to `send`, which says whether the transmit queue took it.
+    pub fn observe(
+        &mut self,
+        frame: &RingFrame<SONARS>,
+        sonar_faults: &FaultCounters,
+        mut send: impl FnMut(&Message) -> Result<(), QueueFull>,
+    ) -> Option<(Place, Update)> {
+        let seen = self.detector.observe(frame).map(|place| {
+            let update = self.filter.observe(place.fingerprint);
+            // A place is no state: one that the queue refuses is missing in the listener's log, and in nothing else.
+            let _ = send(&Message::Place {
+                place_index: update.place_index,
+                frame_index: place.frame_index,
+                radius_mm: place.fingerprint.radius_mm(),
+                degree: place.degree,
+            });
+            self.reporter.update(self.filter.map(), &update, &mut send);
+            (place, update)
+        });
+        let mut faults = *sonar_faults;
+        faults.add(self.detector.faults());
+        faults.add(self.filter.faults());
+        self.reporter.tick(self.filter.map(), &faults, &mut send);
+        seen
+    }
+
+    /// The best map.
+    pub fn map(&self) -> &Map<V> {
+        self.filter.map()
+    }
+
+    /// The filter with all its hypotheses.
+    pub fn filter(&self) -> &PaperFilter<N, V, WORDS> {
+        &self.filter
+    }
+
+    /// The place detector.
+    pub fn detector(&self) -> &PlaceDetector<SONARS> {
+        &self.detector
+    }
+}
+
+impl<const SONARS: usize, const N: usize, const V: usize, const WORDS: usize> Default for Mapper<SONARS, N, V, WORDS> {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+/// A setting of one of the stages is out of its range.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum MapperError {
+    /// The place detector's.
+    Place(PlaceConfigError),
+    /// The filter's.
+    Filter(ConfigError),
+}
+
+impl fmt::Display for MapperError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Place(error) => error.fmt(f),
+            Self::Filter(error) => error.fmt(f),
+        }
+    }
+}
+
+impl core::error::Error for MapperError {}
