@@ -25,6 +25,7 @@ mod map;
 mod mapper;
 mod ngram;
 pub mod place;
+pub mod reference;
 pub mod ring;
 pub mod sonar;
 #[cfg(feature = "wire")]
@@ -37,5 +38,5 @@ pub use fingerprint::{Fingerprint, FingerprintError};
 pub use history::History;
 pub use map::{Map, VerticesFull};
 #[cfg(feature = "wire")]
-pub use mapper::{Mapper, MapperConfig, MapperError, ReferenceMapper};
+pub use mapper::{Mapper, MapperConfig, MapperError};
 pub use ngram::{Ngram, NgramError, NgramLength, NgramTable, NgramsFull};

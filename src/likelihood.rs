@@ -61,9 +61,12 @@ impl Likelihood {
         self.consistency_scale.ln_gaussian(u32::from(distance_mm))
     }
 
-    /// The smallest distance of Eq. 2, in millimetres, whose Eq. 8 surely loses more than `loss` (in the unit of log
-    /// weights).
+    /// A distance of Eq. 2, in millimetres, whose Eq. 8 surely loses more than `loss` (in the unit of log weights);
+    /// `u16::MAX` where Eq. 8 saturates before it loses that much.
     pub(crate) fn consistency_reach_mm(&self, loss: i32) -> u16 {
+        if loss >= LARGEST_LOSS {
+            return u16::MAX;
+        }
         let sigma_mm = u64::from(self.consistency_scale.sigma);
         let reach_mm = ((loss.max(0) as u64 + 1) * sigma_mm * sigma_mm).isqrt() >> 8;
         u16::try_from(reach_mm + 2).unwrap_or(u16::MAX)

@@ -24,12 +24,6 @@ pub struct MapperConfig<const SONARS: usize> {
     pub boot: u32,
 }
 
-impl MapperConfig<16> {
-    /// The settings of the reference robot, in its firmware and wherever a host repeats what the firmware does.
-    pub const REFERENCE: Self =
-        Self { geometry: RingGeometry::even(), place: PlaceConfig::DEFAULT, filter: Config::DEFAULT, seed: 1, boot: 0 };
-}
-
 /// The stages from the ring frame to the messages of the wire, in one piece of fixed memory: a ring of `SONARS`, and a
 /// filter of `N` particles with maps of `V` vertices and `32 · WORDS` places of history.
 ///
@@ -40,9 +34,6 @@ pub struct Mapper<const SONARS: usize, const N: usize, const V: usize, const WOR
     filter: PaperFilter<N, V, WORDS>,
     reporter: Reporter<V>,
 }
-
-/// The mapper of the reference robot: 16 sonars, 10 particles, maps of 16 vertices, 256 places of history.
-pub type ReferenceMapper = Mapper<16, 10, 16, 8>;
 
 impl<const SONARS: usize, const N: usize, const V: usize, const WORDS: usize> Mapper<SONARS, N, V, WORDS> {
     /// A mapper that waits for [`Mapper::start`]; all zero, so that a `static` of it lies in `.bss`.

@@ -1,7 +1,7 @@
 //! The input that the bench image carries is what the simulation gives.
 
-use toposlam::{MapperConfig, place::PlaceDetector};
-use toposlam_host::world::{Plan, RobotModel, SONARS, Simulation};
+use toposlam::reference::{self, Detector};
+use toposlam_host::world::{Plan, RobotModel, Simulation};
 
 const RECORDED_MM: [u16; 200] = include!("../../src/bin/support/bench_input.rs");
 
@@ -12,8 +12,8 @@ const COMPARED: usize = 20;
 fn the_recorded_bench_input_is_the_drive_through_the_office() {
     let plan = Plan::built_in("office").unwrap();
     let simulation = Simulation::new(&plan, RobotModel::default(), 1).unwrap();
-    let mut detector = PlaceDetector::<SONARS>::new();
-    detector.start(MapperConfig::REFERENCE.place, MapperConfig::REFERENCE.geometry).unwrap();
+    let mut detector = Detector::new();
+    detector.start(reference::PLACE, reference::RING).unwrap();
     let places = simulation.filter_map(|(frame, _)| detector.observe(&frame));
     let radii_mm: Vec<_> = places.map(|place| place.fingerprint.radius_mm()).take(COMPARED).collect();
     assert_eq!(radii_mm, RECORDED_MM[..COMPARED]);

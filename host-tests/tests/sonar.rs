@@ -113,7 +113,7 @@ fn ring_with_fault(
 
 #[test]
 fn the_simulated_ring_is_the_reference_robots() {
-    assert_eq!(toposlam_host::world::even_ring(), toposlam::MapperConfig::REFERENCE.geometry);
+    assert_eq!(toposlam_host::world::even_ring(), toposlam::reference::RING);
 }
 
 #[test]

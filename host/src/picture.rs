@@ -3,7 +3,8 @@
 use svg::Document;
 use svg::node::element::{Circle, Group, Line, Path, Polyline, Rectangle, Text, Title, path::Data};
 
-use crate::world::{Plan, Point, TrueMap};
+use crate::mapping::Mapping;
+use crate::world::{Detection, Plan, Point, TrueMap};
 
 /// A vertex of the map to be drawn.
 #[derive(Clone, Debug, PartialEq)]
@@ -28,6 +29,34 @@ pub struct Drawing {
 }
 
 impl Drawing {
+    /// A map as a drawing, each vertex at the mean true position of the places that were taken for it.
+    pub fn of_mapping<const SONARS: usize>(
+        mapping: &Mapping<SONARS>,
+        detections: &[Detection],
+        caption: String,
+    ) -> Self {
+        let map = mapping.map();
+        let visits_of = |vertex: u8| {
+            let visits =
+                mapping.path().iter().zip(detections).filter(move |&(&visited, _)| visited == usize::from(vertex));
+            visits.map(|(_, detection)| detection.position)
+        };
+        let vertices = (0..map.vertices()).map(|vertex| {
+            let visits = visits_of(vertex).count().max(1) as f64;
+            let radius_mm = map.label(vertex).map_or(0, |label| label.radius_mm());
+            Vertex {
+                position: Point {
+                    x_mm: visits_of(vertex).map(|position| position.x_mm).sum::<f64>() / visits,
+                    y_mm: visits_of(vertex).map(|position| position.y_mm).sum::<f64>() / visits,
+                },
+                radius_mm: radius_mm.into(),
+                label: format!("{vertex}: {:.2} m", f64::from(radius_mm) / 1000.0),
+            }
+        });
+        let edges = map.edges().map(|(a, b)| (usize::from(a), usize::from(b))).collect();
+        Self { vertices: vertices.collect(), edges, caption }
+    }
+
     /// The truth as a drawing, its nodes labelled with their number and radius.
     pub fn of_truth(map: &TrueMap, caption: String) -> Self {
         let vertices = map.nodes.iter().enumerate().map(|(index, node)| Vertex {

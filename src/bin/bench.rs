@@ -19,13 +19,13 @@ use cortex_m_rt::exception;
 use cortex_m_semihosting::{debug, hprintln};
 use defmt_rtt as _;
 use static_cell::ConstStaticCell;
-use toposlam::{Fingerprint, MapperConfig, PaperFilter};
+use toposlam::{
+    Fingerprint,
+    reference::{self, Filter},
+};
 
 /// Radii in millimetres, place after place.
 const INPUT_MM: [u16; 200] = include!("support/bench_input.rs");
-/// The filter of [`toposlam::ReferenceMapper`].
-type Filter = PaperFilter<10, 16, 8>;
-
 const TICKS_PER_TURN: u32 = 1 << 24;
 static TURNS: AtomicU32 = AtomicU32::new(0);
 
@@ -90,7 +90,7 @@ fn main() -> ! {
     let filter = FILTER.take();
     let costs = COSTS.take();
     let Some(core) = cortex_m::Peripherals::take() else { panic!() };
-    if filter.start(MapperConfig::REFERENCE.filter, MapperConfig::REFERENCE.seed).is_err() {
+    if filter.start(reference::FILTER, reference::SEED).is_err() {
         panic!()
     }
     let clock = Clock::start(core.SYST);

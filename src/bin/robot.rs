@@ -26,12 +26,12 @@ use stm32f4xx_hal::{
     serial::{Event, Serial, Tx},
 };
 use toposlam::{
-    FaultCounters, FaultKind, MapperConfig, ReferenceMapper,
+    FaultCounters, FaultKind,
+    reference::{self, RobotMapper, SONARS},
     sonar::{Sc18im700, SonarRing, Srf08Config, Srf08Ring},
     wire::{Encoder, Health, MAX_FRAME_BYTES, Message, QueueFull},
 };
 
-const SONARS: usize = 16;
 const TRANSMIT_BYTES: usize = 2048;
 const BRIDGE_BAUD_AT_RESET: u32 = 9600;
 const BAUD: u32 = 115_200;
@@ -161,7 +161,7 @@ fn SysTick() {}
 #[cortex_m_rt::entry]
 fn main() -> ! {
     static QUEUE: ConstStaticCell<Deque<u8, TRANSMIT_BYTES>> = ConstStaticCell::new(Deque::new());
-    static MAPPER: ConstStaticCell<ReferenceMapper> = ConstStaticCell::new(ReferenceMapper::new());
+    static MAPPER: ConstStaticCell<RobotMapper> = ConstStaticCell::new(RobotMapper::new());
 
     let is_emulated = support::is_emulated();
     let (Some(device), Some(mut core)) = (pac::Peripherals::take(), cortex_m::Peripherals::take()) else {
@@ -198,7 +198,7 @@ fn main() -> ! {
     }
 
     let mapper = MAPPER.take();
-    if mapper.start(&MapperConfig::REFERENCE).is_err() {
+    if mapper.start(&reference::MAPPER).is_err() {
         panic!()
     }
     let queue = QUEUE.take();

@@ -242,14 +242,14 @@ impl<E: Evidence<WORDS>, const V: usize, const WORDS: usize, const INDICES: usiz
             return Candidate::IMPOSSIBLE;
         }
         let step_mm = self.length.label_step_mm();
-        let limit = self.likelihood.consistency_reach_mm(loss) / step_mm;
-        let limit = limit.min(Fingerprint::MAX.steps() >> self.length.coarsening());
+        let largest = Fingerprint::MAX.steps() >> self.length.coarsening();
+        let limit = (self.likelihood.consistency_reach_mm(loss) / step_mm).min(largest);
         let hint = parent.consistency_mm / step_mm;
         let distance = self.consistency.search(self.predicted, self.evidence, self.length, self.direction, hint, limit);
         let consistency_mm = match distance {
             Some(steps) => steps * step_mm,
-            // Without a best weight there is no limit, so the distance is infinite.
-            None if self.ln_best == i32::MIN => u16::MAX,
+            // No finite distance is larger.
+            None if limit == largest => u16::MAX,
             None => return Candidate::IMPOSSIBLE,
         };
         let ln_weight = bound.saturating_add(self.likelihood.ln_consistency(consistency_mm));

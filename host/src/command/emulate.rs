@@ -6,7 +6,8 @@ use anyhow::{Context, bail, ensure};
 use clap::Args;
 use indicatif::{ProgressBar, ProgressStyle};
 use toposlam::{
-    FaultCounters, MapperConfig, ReferenceMapper, Update,
+    FaultCounters, Update,
+    reference::{self, RobotMapper},
     wire::{Decoder, Evidence, Location, Message, Picture, Progress, map_digest},
 };
 use toposlam_host::{
@@ -47,7 +48,7 @@ pub(crate) struct Arguments {
 
 /// This computer's repetition of what the firmware does.
 struct Twin {
-    mapper: ReferenceMapper,
+    mapper: RobotMapper,
     places: Vec<(u16, Update)>,
 }
 
@@ -60,8 +61,8 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     let model = RobotModel::default().with_noise(arguments.noise);
     let mut simulation = Simulation::new(&plan, model, arguments.seed)?;
 
-    let mut twin = Twin { mapper: ReferenceMapper::new(), places: Vec::new() };
-    twin.mapper.start(&MapperConfig::REFERENCE)?;
+    let mut twin = Twin { mapper: RobotMapper::new(), places: Vec::new() };
+    twin.mapper.start(&reference::MAPPER)?;
     let twin = Mutex::new(twin);
 
     let progress = ProgressBar::new(arguments.places as u64)

@@ -5,11 +5,13 @@ use std::path::PathBuf;
 use anyhow::Context;
 use clap::Args;
 use indicatif::{ProgressBar, ProgressStyle};
-use toposlam::place::{Place, PlaceConfig, PlaceDetector};
+use toposlam::reference;
 use toposlam::ring::RingFrame;
+use toposlam::wire::map_digest;
+use toposlam_host::mapping::Mapping;
 use toposlam_host::picture::{Drawing, draw};
 use toposlam_host::recording::fault_lines;
-use toposlam_host::world::{Detection, Journal, Plan, RobotModel, SONARS, Simulation, Truth, even_ring};
+use toposlam_host::world::{Journal, Plan, RobotModel, SONARS, Simulation, Truth};
 
 /// Arguments of `toposlam simulate`.
 #[derive(Args)]
@@ -44,34 +46,52 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     let model = RobotModel::default().with_noise(arguments.noise);
     let mut simulation = Simulation::new(&plan, model, arguments.seed)?;
     let mut journal = Journal::new(simulation.true_map());
-    let mut detector = PlaceDetector::<SONARS>::new();
-    detector.start(PlaceConfig::DEFAULT, even_ring())?;
+    let mut mapping = Mapping::start(&reference::MAPPER)?;
+    let mut detections = Vec::new();
 
     let progress = ProgressBar::new(arguments.places as u64)
         .with_style(ProgressStyle::with_template("{bar:40} {pos}/{len} places, {elapsed}")?);
     let frames = if arguments.frames == 0 { usize::MAX } else { arguments.frames as usize };
     drive(simulation.by_ref().take(frames), |frame, truth| {
         journal.drive(truth);
-        if let Some(place) = detector.observe(frame) {
-            let detection = journal.detect(&place);
-            on_place(&place, &detection);
+        if let Some(step) = mapping.observe(frame) {
+            detections.push(journal.detect(&step.place));
+            progress.suspend(|| println!("{step}"));
             progress.inc(1);
         }
-        journal.detections().len() < arguments.places
+        detections.len() < arguments.places
     });
     progress.finish_and_clear();
 
-    let report = journal.report();
-    println!("{}: {} places in {} visits\n{report}", arguments.plan, journal.detections().len(), journal.visits());
-    for line in fault_lines(detector.faults()) {
+    println!("\n{}: {} places in {} visits\n{}", arguments.plan, detections.len(), journal.visits(), journal.report());
+    let nodes: Vec<Option<usize>> = detections.iter().map(|detection| detection.node).collect();
+    let score = mapping.score(simulation.true_map(), &nodes);
+    let (vertices, edges) = (mapping.map().vertices(), mapping.map().edges().count());
+    println!("map: {vertices} vertices, {edges} edges, digest {:08x}", map_digest(mapping.map()));
+    println!(
+        "against the true map: exact {}, isomorphic {}, edge F1 {:.2}, located in {:.0} % of the places",
+        yes_or_no(score.exact),
+        yes_or_no(score.isomorphic),
+        score.edge_f1,
+        100.0 * score.location
+    );
+    for line in fault_lines(&mapping.faults()) {
         println!("fault {line}");
     }
     if let Some(path) = &arguments.svg {
-        let drawing = Drawing::of_truth(simulation.true_map(), format!("{}: the true places", arguments.plan));
+        let drawing = Drawing::of_mapping(
+            &mapping,
+            &detections,
+            format!("{}: the map after {} places", arguments.plan, nodes.len()),
+        );
         let picture = draw(&plan, simulation.true_map(), &drawing);
         std::fs::write(path, picture).with_context(|| format!("writing {}", path.display()))?;
     }
     Ok(())
+}
+
+fn yes_or_no(answer: bool) -> &'static str {
+    if answer { "yes" } else { "no" }
 }
 
 /// Hands every frame on, with what is true in it, until `on_frame` says to stop.
@@ -85,9 +105,6 @@ fn drive(
         }
     }
 }
-
-/// Where each detected place is handed on, with the true node it was detected at.
-fn on_place(_place: &Place, _detection: &Detection) {}
 
 /// A built-in plan by its name, or one from a file.
 pub(super) fn load_plan(name_or_file: &str) -> anyhow::Result<Plan> {

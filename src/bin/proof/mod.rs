@@ -10,9 +10,9 @@ use embedded_hal_nb::{nb, serial};
 use static_cell::ConstStaticCell;
 use toposlam::{
     Config, ConfigError, Consistency, Direction, FaultCounters, FaultKind, Fingerprint, FingerprintError, History, Map,
-    MapperConfig, MapperError, Ngram, NgramError, NgramLength, NgramTable, NgramsFull, PaperFilter, Prior,
-    ReferenceMapper, VerticesFull,
+    MapperError, Ngram, NgramError, NgramLength, NgramTable, NgramsFull, PaperFilter, Prior, VerticesFull,
     place::{PlaceConfig, PlaceConfigError, PlaceDetector},
+    reference,
     ring::RingGeometry,
     ring::{Echo, RingFrame},
     sonar::{BridgeError, Sc18im700, SonarError, SonarRing, Srf08Config, Srf08ConfigError, Srf08Ring},
@@ -290,9 +290,9 @@ fn any_answer(message: &Message) -> Result<(), QueueFull> {
 }
 
 pub(crate) fn mapper() {
-    static MAPPER: ConstStaticCell<ReferenceMapper> = ConstStaticCell::new(ReferenceMapper::new());
+    static MAPPER: ConstStaticCell<reference::RobotMapper> = ConstStaticCell::new(reference::RobotMapper::new());
     let Some(mapper) = MAPPER.try_take() else { return };
-    if let Err(error) = mapper.start(&MapperConfig::REFERENCE.opaque()) {
+    if let Err(error) = mapper.start(&reference::MAPPER.opaque()) {
         show::<MapperError>(error);
     }
     for _ in 0..black_box(9) {

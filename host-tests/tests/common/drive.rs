@@ -1,0 +1,316 @@
+//! A core filter and the reference filter side by side, on the same observations and the same random draws.
+
+use super::{fingerprint, length};
+use toposlam::{Config, Direction, FaultKind, Fingerprint, PaperFilter, Particle as CoreParticle, Prior, Update};
+use toposlam_host_tests::filter::{self, Candidate, Map, Parameters, Particle};
+use toposlam_host_tests::graph::Graph;
+use toposlam_host_tests::ngram::NgramSet;
+
+/// Particles of the core in these tests.
+pub const PARTICLES: usize = 10;
+/// Vertices of its maps.
+pub const VERTICES: usize = 8;
+/// Words of its history: 32 places, so that longer drives wrap.
+pub const WORDS: usize = 1;
+/// Words of a prior: 512 n-grams.
+pub const PRIOR_WORDS: usize = 32;
+
+/// By how much a logarithm of Eq. 7 or 8 may be off, in nats, and relative to its size.
+pub const LN_TOLERANCE: (f64, f64) = (2e-5, 1e-6);
+/// By how much each of the A² factors of Eq. 9 may be off, in nats: rounding, what f32 loses in 1 − φ, and, where σ_l is
+/// too large for the core's table to hold every label difference, linear interpolation between points h = 0.035 σ_l
+/// apart, which errs by up to h²/8 times the curvature 2φ / (1 − φ).
+pub fn penalty_tolerance(parameters: &Parameters) -> f64 {
+    let phi = parameters.phi;
+    let interpolation = if parameters.sigma_label_mm > 113.0 { 3.1e-4 * phi / (1.0 - phi) } else { 0.0 };
+    1e-5 + 1e-7 / (1.0 - phi) + interpolation
+}
+
+/// By how much a weight may be off, relative to the best one: it is rounded to this.
+pub const WEIGHT_STEP: f64 = 1.0 / (1 << 20) as f64;
+/// Eq. 7 and 8 do not fall below e to the minus this in the core.
+pub const LARGEST_LOSS: f64 = 4096.0;
+
+/// A small deterministic generator (SplitMix64) for drives and draws.
+pub struct Random(pub u64);
+
+impl Random {
+    /// 64 random bits.
+    pub fn bits(&mut self) -> u64 {
+        self.0 = self.0.wrapping_add(0x9E37_79B9_7F4A_7C15);
+        let mixed = (self.0 ^ (self.0 >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
+        let mixed = (mixed ^ (mixed >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
+        mixed ^ (mixed >> 31)
+    }
+
+    /// A number below a limit.
+    pub fn below(&mut self, limit: usize) -> usize {
+        (self.bits() % limit as u64) as usize
+    }
+
+    /// A connected building of so many places with a few look-alikes, labels on the grid.
+    pub fn building(&mut self, places: usize) -> Graph {
+        let spacing_mm = [60.0, 200.0, 400.0][self.below(3)];
+        let labels: Vec<f64> = (0..places).map(|_| 1000.0 + spacing_mm * self.below(4) as f64).collect();
+        let mut building = Graph::with(&labels, &[]);
+        for place in 1..places {
+            building.add_edge(place, self.below(place));
+        }
+        for _ in 0..places / 2 {
+            building.add_edge(self.below(places), self.below(places));
+        }
+        building
+    }
+
+    /// What a robot on a random walk through a building measures, with noise of up to so many steps.
+    pub fn walk(&mut self, building: &Graph, observations: usize, noise_steps: usize) -> Vec<f64> {
+        let mut place = self.below(building.vertices());
+        let mut observe = |_| {
+            let ways: Vec<usize> = building.neighbours(place).iter().copied().collect();
+            place = ways[self.below(ways.len())];
+            let noise = self.below(2 * noise_steps + 1) as f64 - noise_steps as f64;
+            building.label(place) + 2.0 * noise
+        };
+        (0..observations).map(&mut observe).collect()
+    }
+}
+
+/// What the filters hold their maps against.
+pub enum Evidence {
+    /// Their own history.
+    OnLine,
+    /// The n-grams of an earlier exploration.
+    Prior(Vec<f64>),
+}
+
+/// How close to a tie the draws of a drive were.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Tally {
+    /// Random draws in all.
+    pub draws: usize,
+    /// Draws so close to the boundary of two candidates that the tolerance lets either have it.
+    pub ties: usize,
+    /// Draws whose candidate differs, every one of them a tie.
+    pub differing: usize,
+}
+
+/// Both filters.
+pub struct Drive {
+    config: Config,
+    parameters: Parameters,
+    core: Box<PaperFilter<PARTICLES, VERTICES, WORDS>>,
+    prior: Option<(Box<Prior<VERTICES, PRIOR_WORDS>>, NgramSet)>,
+    particles: Vec<Particle>,
+    history_mm: Vec<f64>,
+    /// How close the draws were so far.
+    pub tally: Tally,
+}
+
+impl Drive {
+    /// Both filters with one configuration, before the first observation.
+    pub fn new(config: Config, evidence: &Evidence) -> Self {
+        let n = usize::from(config.ngram_length);
+        let parameters = Parameters {
+            n,
+            particles: usize::from(config.particles),
+            phi: f64::from(config.penalty_permille) / 1000.0,
+            sigma_label_mm: f64::from(config.sigma_label_mm),
+            sigma_consistency_mm: f64::from(config.sigma_consistency_mm),
+            direction: match config.direction {
+                Direction::TwoSided => filter::Direction::TwoSided,
+                Direction::MapToHistory => filter::Direction::MapToHistory,
+                Direction::HistoryToMap => filter::Direction::HistoryToMap,
+            },
+            label_grid_mm: Some(f64::from(Fingerprint::STEP_MM)),
+            ngram_grid_mm: Some(f64::from(length(n).label_step_mm())),
+            farthest_mm: LARGEST_LOSS.sqrt() * f64::from(config.sigma_consistency_mm),
+            most_vertices: VERTICES,
+        };
+        let mut core = Box::new(PaperFilter::new());
+        core.start(config, 0).expect("tests use valid configurations");
+        let prior = match evidence {
+            Evidence::OnLine => None,
+            Evidence::Prior(exploration_mm) => {
+                let mut prior = Box::new(Prior::new(length(n)));
+                let mut exploration = toposlam::History::<8>::new();
+                for &label_mm in exploration_mm {
+                    exploration.push(fingerprint(label_mm));
+                    prior.extend(&exploration).expect("tests keep to the capacity");
+                }
+                Some((prior, parameters.grams_of_history(exploration_mm)))
+            }
+        };
+        let particles = filter::first_particles(&parameters);
+        Self { config, parameters, core, prior, particles, history_mm: Vec::new(), tally: Tally::default() }
+    }
+
+    /// One place for both filters; panics where they differ.
+    pub fn observe(&mut self, observation_mm: f64, random: &mut Random) {
+        let draws: [u32; PARTICLES] = std::array::from_fn(|_| (random.bits() >> 32) as u32);
+        self.history_mm.push(observation_mm);
+        let observation = fingerprint(observation_mm);
+        let (update, evidence) = match &mut self.prior {
+            Some((prior, grams)) => (self.core.observe_with_prior_and_draws(observation, prior, &draws), grams.clone()),
+            None => {
+                let kept = &self.history_mm[self.history_mm.len().saturating_sub(32 * WORDS)..];
+                (self.core.observe_with_draws(observation, &draws), self.parameters.grams_of_history(kept))
+            }
+        };
+        let pool = filter::predict(&self.particles, observation_mm, &evidence, &self.parameters);
+        let chosen = self.chosen_by_the_core(&pool);
+        self.check_choice(&pool, &chosen, &draws);
+        self.check_update(&pool, &chosen, update);
+        self.particles = filter::resample(&pool, &chosen);
+        self.check_particles(&pool);
+    }
+
+    /// How often the core met a fault of a kind.
+    pub fn faults(&self, kind: FaultKind) -> u32 {
+        self.core.faults().of(kind)
+    }
+
+    /// The numbers of vertices of the core's maps.
+    pub fn sizes(&self) -> Vec<u8> {
+        self.core.particles().iter().map(|particle| particle.map.vertices()).collect()
+    }
+
+    /// The candidates that the core drew, in the order of the pool.
+    fn chosen_by_the_core(&self, pool: &[Candidate]) -> Vec<usize> {
+        let candidate_of = |particle: &CoreParticle<VERTICES>| {
+            let is_it = |candidate: &Candidate| {
+                (candidate.parent, candidate.vertex) == (usize::from(particle.parent), usize::from(particle.place))
+            };
+            pool.iter().position(is_it).expect("the core draws from the same pool")
+        };
+        let repeated = |particle| std::iter::repeat_n(candidate_of(particle), usize::from(particle.multiplicity));
+        self.core.particles().iter().flat_map(repeated).collect()
+    }
+
+    /// Every draw has the reference's candidate, or lies so close to a boundary that the tolerance does not tell.
+    ///
+    /// A larger draw never has an earlier candidate, so the sorted draws belong to the sorted candidates.
+    fn check_choice(&mut self, pool: &[Candidate], chosen: &[usize], draws: &[u32; PARTICLES]) {
+        let mut draws: Vec<f64> = draws[..self.parameters.particles].iter().map(|&draw| unit(draw)).collect();
+        draws.sort_by(f64::total_cmp);
+        let weights = filter::normalised_weights(pool);
+        let expected = filter::drawn(&weights, &draws);
+        assert_eq!(chosen.len(), draws.len(), "all draws have a candidate");
+        let boundaries = self.boundaries(pool, &weights);
+        for ((&draw, &expected), &chosen) in draws.iter().zip(&expected).zip(chosen) {
+            let (below, above) = (boundaries[chosen], boundaries[chosen + 1]);
+            assert!(
+                below.0 - below.1 <= draw && draw <= above.0 + above.1,
+                "draw {draw} chose candidate {chosen}, not {expected}, of {weights:?} with {:?}",
+                self.config
+            );
+            let is_tie = boundaries.iter().any(|(boundary, tolerance)| (draw - boundary).abs() <= *tolerance);
+            self.tally.draws += 1;
+            self.tally.ties += usize::from(is_tie);
+            self.tally.differing += usize::from(chosen != expected);
+        }
+    }
+
+    /// Where one candidate's share of the draws ends and the next one's begins, and by how much that may be off.
+    ///
+    /// When all logarithms are off by at most ε, a share c of the sum is off by at most 2 ε c (1 − c); the rounding of the
+    /// weights comes on top.
+    fn boundaries(&self, pool: &[Candidate], weights: &[f64]) -> Vec<(f64, f64)> {
+        let drawable = pool.iter().zip(weights).filter(|&(_, &weight)| weight > 1e-7);
+        let epsilon = drawable.map(|(candidate, _)| self.tolerance_of_weight(candidate)).fold(0.0, f64::max);
+        let multiplicities: usize = pool.iter().map(|candidate| candidate.multiplicity).sum();
+        let rounding = WEIGHT_STEP / 2.0 * multiplicities as f64;
+        let mut share = 0.0;
+        let mut boundaries = vec![(0.0, rounding)];
+        for weight in weights {
+            share += weight;
+            boundaries.push((share, 2.0 * epsilon * share * (1.0 - share).max(0.0) + rounding));
+        }
+        boundaries
+    }
+
+    /// By how much ln of Eq. 6 may be off.
+    fn tolerance_of_weight(&self, candidate: &Candidate) -> f64 {
+        let of_penalty = penalty_tolerance(&self.parameters) * candidate.map.graph.vertices().pow(2) as f64;
+        let gaussian = candidate.ln_observation + candidate.ln_consistency;
+        2.0 * LN_TOLERANCE.0 + of_penalty - LN_TOLERANCE.1 * gaussian
+    }
+
+    fn check_update(&self, pool: &[Candidate], chosen: &[usize], update: Update) {
+        assert_eq!(update.place_index as usize + 1, self.history_mm.len());
+        assert_eq!(usize::from(update.distinct), self.core.particles().len());
+        let ascending = |candidates: &mut dyn Iterator<Item = usize>| {
+            let mut candidates: Vec<&Candidate> = candidates.map(|candidate| &pool[candidate]).collect();
+            candidates.sort_by(|a, b| a.ln_weight().total_cmp(&b.ln_weight()));
+            candidates
+        };
+        let (lead, tolerance) = match ascending(&mut (0..pool.len()))[..] {
+            [.., second, best] => (
+                (best.ln_weight() - second.ln_weight()).min(15.0),
+                self.tolerance_of_weight(best) + self.tolerance_of_weight(second),
+            ),
+            _ => (15.0, 0.0),
+        };
+        assert!((nats(update.lead_q16) - lead).abs() <= tolerance, "{update:?} {lead} {:?}", self.config);
+        let best = self.core.best();
+        let of_chosen = ascending(&mut chosen.iter().copied());
+        let heaviest = of_chosen[of_chosen.len() - 1];
+        let difference = nats(best.factors.ln_weight_q16()) - heaviest.ln_weight();
+        assert!(difference.abs() <= self.tolerance_of_weight(heaviest), "{update:?} {difference}");
+        assert_eq!((update.vertex, update.factors), (best.place, best.factors));
+        assert_eq!(update.is_new, best.map.visits(best.place) == 1);
+    }
+
+    fn check_particles(&self, pool: &[Candidate]) {
+        assert_eq!(self.core.particles().len(), self.particles.len());
+        for (core, particle) in self.core.particles().iter().zip(&self.particles) {
+            assert_eq!(usize::from(core.multiplicity), particle.multiplicity);
+            assert_eq!(Some(usize::from(core.place)), particle.place);
+            assert_eq!(map_of(core), map_parts(&particle.map));
+            let is_it = |candidate: &&Candidate| {
+                (candidate.parent, candidate.vertex) == (particle.parent, usize::from(core.place))
+            };
+            self.check_factors(core, pool.iter().find(is_it).expect("it was drawn from the pool"));
+        }
+    }
+
+    fn check_factors(&self, core: &CoreParticle<VERTICES>, candidate: &Candidate) {
+        let distance_mm = match self.parameters.direction {
+            filter::Direction::TwoSided => candidate.distance.two_sided(),
+            filter::Direction::MapToHistory => candidate.distance.map_to_history,
+            filter::Direction::HistoryToMap => candidate.distance.history_to_map,
+        };
+        assert_eq!(f64::from(core.consistency_mm), distance_mm.min(f64::from(u16::MAX)), "Eq. 2");
+        let near = |of_core: i32, ln: f64, tolerance: f64, equation: &str| {
+            assert!((nats(of_core) - ln).abs() <= tolerance, "{equation}: {} {ln} {:?}", nats(of_core), self.config);
+        };
+        let gaussian = |ln: f64| LN_TOLERANCE.0 - ln * LN_TOLERANCE.1;
+        let ln_observation = candidate.ln_observation.max(-LARGEST_LOSS);
+        near(core.factors.ln_label_q16, ln_observation, gaussian(ln_observation), "Eq. 7");
+        near(core.factors.ln_consistency_q16, candidate.ln_consistency, gaussian(candidate.ln_consistency), "Eq. 8");
+        let factors = candidate.map.graph.vertices().pow(2) as f64;
+        near(core.factors.ln_size_q16, candidate.ln_penalty, penalty_tolerance(&self.parameters) * factors, "Eq. 9");
+    }
+}
+
+fn nats(log_q16: i32) -> f64 {
+    f64::from(log_q16) / 65536.0
+}
+
+fn unit(draw: u32) -> f64 {
+    f64::from(draw) / 2_f64.powi(32)
+}
+
+type MapParts = (Vec<f64>, Vec<usize>, Vec<(usize, usize)>);
+
+fn map_of(particle: &CoreParticle<VERTICES>) -> MapParts {
+    let map = &particle.map;
+    let labels = map.labels().iter().map(|label| f64::from(label.radius_mm())).collect();
+    let visits = (0..map.vertices()).map(|vertex| map.visits(vertex) as usize).collect();
+    let edges = map.edges().map(|(a, b)| (usize::from(a), usize::from(b))).collect();
+    (labels, visits, edges)
+}
+
+fn map_parts(map: &Map) -> MapParts {
+    let visits = (0..map.graph.vertices()).map(|vertex| map.visits(vertex)).collect();
+    (map.graph.labels().to_vec(), visits, map.graph.edges())
+}
