@@ -225,7 +225,7 @@ fn main() -> ! {
             if let Some((_, update)) = mapper.observe(&frame, &faults, |message| transmitter.send(message)) {
                 defmt::info!("place {} is vertex {}", update.place_index, update.vertex);
             }
-            if loop_count % FRAMES_PER_HEALTH == 0 {
+            if loop_count.is_multiple_of(FRAMES_PER_HEALTH) {
                 // A message that finds no room is counted; the next one comes.
                 let _ = transmitter.send(&Message::Health(health(loop_count)));
             }

@@ -314,10 +314,8 @@ pub(crate) fn wire() {
     };
     let mut encoder = Encoder::new(black_box(9));
     let message = Message::Edge { a: 1, b: 2, present: true }.opaque();
-    if let Some(out) = bytes.get_mut(..black_box(40)) {
-        if let Err(error) = encoder.encode(&message, out) {
-            show::<EncodeError>(error);
-        }
+    if let Some(Err(error)) = bytes.get_mut(..black_box(40)).map(|out| encoder.encode(&message, out)) {
+        show::<EncodeError>(error);
     }
     let mut rest = bytes.as_slice().opaque();
     loop {
