@@ -52,6 +52,9 @@ fn main() -> ! {
     proof::fingerprint_and_ngram();
     proof::map_and_history();
     proof::filter();
+    proof::place();
+    proof::mapper();
+    proof::wire();
     #[cfg(teeth)]
     black_box(can_panic(black_box(&[1, 2, 3])));
     loop {

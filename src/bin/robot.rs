@@ -9,7 +9,11 @@ mod support;
 
 use core::cell::RefCell;
 
-use cortex_m::asm;
+use cortex_m::{
+    asm,
+    peripheral::{NVIC, syst::SystClkSource},
+};
+use cortex_m_rt::exception;
 use defmt_rtt as _;
 use embedded_hal::delay::DelayNs;
 use embedded_hal_nb::{nb, serial};
@@ -19,32 +23,21 @@ use stm32f4xx_hal::{
     pac,
     prelude::*,
     rcc::{self, Rcc},
-    serial::{Serial, Tx},
+    serial::{Event, Serial, Tx},
 };
 use toposlam::{
-    FaultCounters, FaultKind, Fingerprint,
-    reference::{self, Detector, Filter, HISTORY_WORDS, PARTICLES, SONARS, VERTICES},
+    FaultCounters, FaultKind,
+    reference::{self, RobotMapper, SONARS},
     sonar::{Sc18im700, SonarRing, Srf08Config, Srf08Ring},
-    wire::{Capacities, Encoder, Health, Hello, MAX_FRAME_BYTES, Message, QueueFull, Reporter},
+    wire::{Encoder, Health, MAX_FRAME_BYTES, Message, QueueFull},
 };
 
 const TRANSMIT_BYTES: usize = 2048;
 const BRIDGE_BAUD_AT_RESET: u32 = 9600;
 const BAUD: u32 = 115_200;
-const EMULATED_PAUSE_CYCLES: u32 = 2000;
-const FRAMES_PER_HELLO: u16 = 128;
 const FRAMES_PER_HEALTH: u32 = 256;
 /// Time for some 30 bytes on the line.
 const PACE_US: u32 = 2500;
-
-const CAPACITIES: Capacities = Capacities {
-    vertices: VERTICES as u8,
-    hypotheses: PARTICLES as u16,
-    history: (HISTORY_WORDS * 32) as u16,
-    ngram_length: reference::FILTER.ngram_length,
-    fingerprint_step_mm: Fingerprint::STEP_MM as u8,
-    sonars: SONARS as u8,
-};
 
 /// The bytes that wait for USART1, and the line itself.
 struct Transmitter {
@@ -110,29 +103,34 @@ impl DelayNs for SendingDelay<'_> {
     }
 }
 
-/// A UART that pauses before it says "nothing yet", so that a number of polls is a time.
+/// A UART that waits a moment before it says "nothing yet", so that a number of polls is a time.
 ///
-/// Without the pause the emulator would do nothing but serve the polls, and bytes would reach it late.
-struct PausingUart<UART> {
+/// While it sends, the moment is short, for the receiver holds one byte only. Otherwise it sleeps until a byte arrives
+/// or the clock ticks; the emulator then has the time to bring the byte.
+struct SleepingUart<UART> {
     uart: UART,
-    pause_cycles: u32,
+    cycles_while_sending: u32,
 }
 
-impl<UART: serial::ErrorType> serial::ErrorType for PausingUart<UART> {
+impl<UART: serial::ErrorType> serial::ErrorType for SleepingUart<UART> {
     type Error = UART::Error;
 }
 
-impl<UART: serial::Read<u8>> serial::Read<u8> for PausingUart<UART> {
+impl<UART: serial::Read<u8> + serial::Write<u8>> serial::Read<u8> for SleepingUart<UART> {
     fn read(&mut self) -> nb::Result<u8, UART::Error> {
-        self.uart.read().inspect_err(|error| {
-            if matches!(error, nb::Error::WouldBlock) {
-                asm::delay(self.pause_cycles);
+        let answer = self.uart.read();
+        if matches!(answer, Err(nb::Error::WouldBlock)) {
+            if self.uart.flush().is_ok() {
+                sleep_until_a_byte_or_a_tick();
+            } else {
+                asm::delay(self.cycles_while_sending);
             }
-        })
+        }
+        answer
     }
 }
 
-impl<UART: serial::Write<u8>> serial::Write<u8> for PausingUart<UART> {
+impl<UART: serial::Write<u8>> serial::Write<u8> for SleepingUart<UART> {
     fn write(&mut self, byte: u8) -> nb::Result<(), UART::Error> {
         self.uart.write(byte)
     }
@@ -142,21 +140,31 @@ impl<UART: serial::Write<u8>> serial::Write<u8> for PausingUart<UART> {
     }
 }
 
-/// The small stages.
-struct Stages {
-    detector: Detector,
-    reporter: Reporter<VERTICES>,
+/// With interrupts off, a pending one still ends the sleep; so no byte slips in between the look and the sleep.
+fn sleep_until_a_byte_or_a_tick() {
+    cortex_m::interrupt::free(|_| {
+        // SAFETY: interrupts are off until it is masked again, so no handler runs.
+        #[allow(unsafe_code)]
+        unsafe {
+            NVIC::unmask(pac::Interrupt::USART2);
+        }
+        asm::wfi();
+        NVIC::mask(pac::Interrupt::USART2);
+        NVIC::unpend(pac::Interrupt::USART2);
+    });
 }
+
+/// Nothing but the end of a sleep.
+#[exception]
+fn SysTick() {}
 
 #[cortex_m_rt::entry]
 fn main() -> ! {
-    static STAGES: ConstStaticCell<Stages> =
-        ConstStaticCell::new(Stages { detector: Detector::new(), reporter: Reporter::new() });
     static QUEUE: ConstStaticCell<Deque<u8, TRANSMIT_BYTES>> = ConstStaticCell::new(Deque::new());
-    static FILTER: ConstStaticCell<Filter> = ConstStaticCell::new(Filter::new());
+    static MAPPER: ConstStaticCell<RobotMapper> = ConstStaticCell::new(RobotMapper::new());
 
     let is_emulated = support::is_emulated();
-    let Some(device) = pac::Peripherals::take() else {
+    let (Some(device), Some(mut core)) = (pac::Peripherals::take(), cortex_m::Peripherals::take()) else {
         // They are taken here for the first time.
         panic!()
     };
@@ -167,31 +175,33 @@ fn main() -> ! {
     };
     let (line, _) = line.split();
 
-    // 4000 polls of 5 us: 20 ms. The emulator's far end may be slow to be scheduled, so there it is seconds.
-    let pause_cycles = if is_emulated { EMULATED_PAUSE_CYCLES } else { rcc.clocks.sysclk().raw() / 200_000 };
-    let poll_budget = if is_emulated { 400_000 } else { 4000 };
+    // 200 polls are 4 ms while sending and 50 ms otherwise; the emulator's far end may be slow to be scheduled.
+    let clock_hz = rcc.clocks.sysclk().raw();
+    core.SYST.set_clock_source(SystClkSource::Core);
+    core.SYST.set_reload(if is_emulated { 0x00FF_FFFF } else { clock_hz / 4000 - 1 });
+    core.SYST.clear_current();
+    core.SYST.enable_interrupt();
+    core.SYST.enable_counter();
+    let bridge_on = |uart| Sc18im700::new(SleepingUart { uart, cycles_while_sending: clock_hz / 50_000 }, 200);
     let bridge_pins = (port_a.pa2, port_a.pa3);
     let Ok(uart) = Serial::<_, u8>::new(device.USART2, bridge_pins, BRIDGE_BAUD_AT_RESET.bps(), &mut rcc) else {
         panic!()
     };
-    let mut bridge = Sc18im700::new(PausingUart { uart, pause_cycles }, poll_budget);
+    let mut bridge = bridge_on(uart);
     let asked = bridge.set_baud_rate(BAUD);
     let (uart, (Some(bridge_tx), Some(bridge_rx))) = bridge.release().uart.release() else { panic!() };
-    let Ok(uart) = Serial::<_, u8>::new(uart, (bridge_tx, bridge_rx), BAUD.bps(), &mut rcc) else { panic!() };
-    let mut bridge = Sc18im700::new(PausingUart { uart, pause_cycles }, poll_budget);
+    let Ok(mut uart) = Serial::<_, u8>::new(uart, (bridge_tx, bridge_rx), BAUD.bps(), &mut rcc) else { panic!() };
+    uart.listen(Event::RxNotEmpty);
+    let mut bridge = bridge_on(uart);
     if let Err(error) = asked.and_then(|()| bridge.start()) {
         defmt::warn!("the bridge to the sonars: {}", error);
     }
 
-    let Stages { detector, reporter } = STAGES.take();
-    let queue = QUEUE.take();
-    let filter = FILTER.take();
-    if detector.start(reference::PLACE, reference::RING).is_err()
-        || filter.start(reference::FILTER, reference::SEED).is_err()
-    {
+    let mapper = MAPPER.take();
+    if mapper.start(&reference::MAPPER).is_err() {
         panic!()
     }
-    reporter.start(Hello::new(0, reference::SEED, CAPACITIES), FRAMES_PER_HELLO);
+    let queue = QUEUE.take();
     // One zero, so that noise from the start does not spoil the first frame.
     let _ = queue.push_back(0);
     let transmitter = Transmitter { queue, line, encoder: Encoder::default(), faults: FaultCounters::new() };
@@ -210,26 +220,15 @@ fn main() -> ! {
             defmt::debug!("{}", error);
         }
         if let Ok(mut transmitter) = transmitter.try_borrow_mut() {
-            if let Some(place) = detector.observe(&frame) {
-                let update = filter.observe(place.fingerprint);
+            let mut faults = ring_faults;
+            faults.add(&transmitter.faults);
+            if let Some((_, update)) = mapper.observe(&frame, &faults, |message| transmitter.send(message)) {
                 defmt::info!("place {} is vertex {}", update.place_index, update.vertex);
-                // A message that finds no room is counted, and the rolling picture makes up for it.
-                let _ = transmitter.send(&Message::Place {
-                    place_index: update.place_index,
-                    frame_index: place.frame_index,
-                    radius_mm: place.fingerprint.radius_mm(),
-                    degree: place.degree,
-                });
-                reporter.update(filter.map(), &update, |message| transmitter.send(message));
             }
-            if loop_count % FRAMES_PER_HEALTH == 0 {
+            if loop_count.is_multiple_of(FRAMES_PER_HEALTH) {
+                // A message that finds no room is counted; the next one comes.
                 let _ = transmitter.send(&Message::Health(health(loop_count)));
             }
-            let mut faults = ring_faults;
-            for more in [detector.faults(), filter.faults(), &transmitter.faults] {
-                faults.add(more);
-            }
-            reporter.tick(filter.map(), &faults, |message| transmitter.send(message));
         }
         // A ring that is not there answers at once; the line still gets its time.
         pace.delay_us(PACE_US);

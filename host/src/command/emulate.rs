@@ -6,8 +6,8 @@ use anyhow::{Context, bail, ensure};
 use clap::Args;
 use indicatif::{ProgressBar, ProgressStyle};
 use toposlam::{
-    Update,
-    reference::{self, Detector, Filter, VERTICES},
+    FaultCounters, Update,
+    reference::{self, RobotMapper},
     wire::{Decoder, Evidence, Location, Message, Picture, Progress, map_digest},
 };
 use toposlam_host::{
@@ -48,8 +48,7 @@ pub(crate) struct Arguments {
 
 /// This computer's repetition of what the firmware does.
 struct Twin {
-    detector: Detector,
-    filter: Filter,
+    mapper: RobotMapper,
     places: Vec<(u16, Update)>,
 }
 
@@ -62,15 +61,14 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     let model = RobotModel::default().with_noise(arguments.noise);
     let mut simulation = Simulation::new(&plan, model, arguments.seed)?;
 
-    let mut twin = Twin { detector: Detector::new(), filter: Filter::new(), places: Vec::new() };
-    twin.detector.start(reference::PLACE, reference::RING)?;
-    twin.filter.start(reference::FILTER, reference::SEED)?;
+    let mut twin = Twin { mapper: RobotMapper::new(), places: Vec::new() };
+    twin.mapper.start(&reference::MAPPER)?;
     let twin = Mutex::new(twin);
 
     let progress = ProgressBar::new(arguments.places as u64)
         .with_style(ProgressStyle::with_template("{bar:40} {pos}/{len} places, {elapsed}")?);
     let mut decoder = Decoder::new();
-    let mut picture = Picture::<VERTICES>::new();
+    let mut picture = Picture::<64>::new();
     let mut heard_places = Vec::new();
 
     let mut emulation = Emulation::new(elf);
@@ -83,8 +81,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
                 return None;
             }
             let (frame, _) = simulation.next()?;
-            if let Some(place) = twin.detector.observe(&frame) {
-                let update = twin.filter.observe(place.fingerprint);
+            if let Some((place, update)) = twin.mapper.observe(&frame, &FaultCounters::new(), |_| Ok(())) {
                 twin.places.push((place.fingerprint.radius_mm(), update));
             }
             Some(frame)
@@ -129,20 +126,20 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     let expected_places: Vec<_> = (0..).zip(twin.places.iter().map(|(radius_mm, _)| *radius_mm)).collect();
     ensure!(heard_places == expected_places, "the firmware detected other places than this computer");
     ensure!(picture.is_converged(), "the map heard over the wire is not complete");
-    let same_map = (0..twin.filter.map().vertices()).all(|vertex| {
+    let same_map = (0..twin.mapper.map().vertices()).all(|vertex| {
         picture.row(vertex).is_some_and(|row| {
-            let map = twin.filter.map();
+            let map = twin.mapper.map();
             map.label(vertex).map(|label| label.radius_mm()) == Some(row.radius_mm)
                 && map.visits(vertex) == row.visits
                 && map.neighbours(vertex) == row.neighbours
         })
     });
-    ensure!(same_map && picture.vertices() == twin.filter.map().vertices(), "the firmware's map is another one");
+    ensure!(same_map && picture.vertices() == twin.mapper.map().vertices(), "the firmware's map is another one");
     if let Some((_, update)) = twin.places.last() {
         ensure!(picture.location() == Some(Location::from(update)), "the firmware believes to be elsewhere");
         ensure!(picture.evidence() == Some(Evidence::from(update)), "the firmware gives other evidence");
     }
-    println!("the firmware's map is this computer's, bit for bit (digest {:08x})", map_digest(twin.filter.map()));
+    println!("the firmware's map is this computer's, bit for bit (digest {:08x})", map_digest(twin.mapper.map()));
     Ok(())
 }
 

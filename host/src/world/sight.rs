@@ -52,12 +52,8 @@ impl Default for SonarModel {
 }
 
 /// The simulated ring: 16 sonars 22.5° apart, counter-clockwise, the first straight ahead.
-pub fn even_ring() -> RingGeometry<SONARS> {
-    let mut geometry = RingGeometry { bearings_mrad: [0; SONARS] };
-    for (sonar, bearing_mrad) in geometry.bearings_mrad.iter_mut().enumerate() {
-        *bearing_mrad = (wrapped(TAU * sonar as f64 / SONARS as f64) * 1000.0).round() as i16;
-    }
-    geometry
+pub const fn even_ring() -> RingGeometry<SONARS> {
+    RingGeometry::even()
 }
 
 /// An angle brought into −π to π.

@@ -10,9 +10,16 @@ use embedded_hal_nb::{nb, serial};
 use static_cell::ConstStaticCell;
 use toposlam::{
     Config, ConfigError, Consistency, Direction, FaultCounters, FaultKind, Fingerprint, FingerprintError, History, Map,
-    Ngram, NgramError, NgramLength, NgramTable, NgramsFull, PaperFilter, Prior, VerticesFull,
+    MapperError, Ngram, NgramError, NgramLength, NgramTable, NgramsFull, PaperFilter, Prior, VerticesFull,
+    place::{PlaceConfig, PlaceConfigError, PlaceDetector},
+    reference,
+    ring::RingGeometry,
     ring::{Echo, RingFrame},
     sonar::{BridgeError, Sc18im700, SonarError, SonarRing, Srf08Config, Srf08ConfigError, Srf08Ring},
+    wire::{
+        Decoder, EncodeError, Encoder, Hello, HelloError, MAX_FRAME_BYTES, Message, Picture, Progress, QueueFull,
+        Reporter, map_digest,
+    },
 };
 
 const PARTICLES: usize = 10;
@@ -259,4 +266,83 @@ pub(crate) fn filter() {
         black_box(prior.extend(filter.history()).is_ok());
     }
     black_box((filter.best(), filter.particles(), filter.observed(), filter.faults(), filter.config(), filter.map()));
+}
+
+fn any_frame() -> RingFrame<16> {
+    RingFrame { echoes: black_box([Echo::Range { range_mm: 1000 }; 16]) }
+}
+
+pub(crate) fn place() {
+    static DETECTOR: ConstStaticCell<PlaceDetector<16>> = ConstStaticCell::new(PlaceDetector::new());
+    let Some(detector) = DETECTOR.try_take() else { return };
+    if let Err(error) = detector.start(PlaceConfig::default().opaque(), RingGeometry::even().opaque()) {
+        show::<PlaceConfigError>(error);
+    }
+    for _ in 0..black_box(9) {
+        black_box(detector.observe(&any_frame()));
+    }
+    black_box(detector.faults());
+}
+
+fn any_answer(message: &Message) -> Result<(), QueueFull> {
+    black_box(message);
+    if black_box(true) { Ok(()) } else { Err(QueueFull) }
+}
+
+pub(crate) fn mapper() {
+    static MAPPER: ConstStaticCell<reference::RobotMapper> = ConstStaticCell::new(reference::RobotMapper::new());
+    let Some(mapper) = MAPPER.try_take() else { return };
+    if let Err(error) = mapper.start(&reference::MAPPER.opaque()) {
+        show::<MapperError>(error);
+    }
+    for _ in 0..black_box(9) {
+        black_box(mapper.observe(&any_frame(), &FaultCounters::new().opaque(), any_answer));
+    }
+    black_box((mapper.map(), mapper.filter(), mapper.detector()));
+    static REPORTER: ConstStaticCell<Reporter<VERTICES>> = ConstStaticCell::new(Reporter::new());
+    let Some(reporter) = REPORTER.try_take() else { return };
+    reporter.tick(mapper.map(), &FaultCounters::new().opaque(), any_answer);
+    black_box((reporter.refused(), map_digest(mapper.map())));
+}
+
+pub(crate) fn wire() {
+    static BYTES: ConstStaticCell<[u8; MAX_FRAME_BYTES]> = ConstStaticCell::new([0; MAX_FRAME_BYTES]);
+    static DECODER: ConstStaticCell<Decoder> = ConstStaticCell::new(Decoder::new());
+    static PICTURE: ConstStaticCell<Picture<64>> = ConstStaticCell::new(Picture::new());
+    let (Some(bytes), Some(decoder), Some(picture)) = (BYTES.try_take(), DECODER.try_take(), PICTURE.try_take()) else {
+        return;
+    };
+    let mut encoder = Encoder::new(black_box(9));
+    let message = Message::Edge { a: 1, b: 2, present: true }.opaque();
+    if let Some(Err(error)) = bytes.get_mut(..black_box(40)).map(|out| encoder.encode(&message, out)) {
+        show::<EncodeError>(error);
+    }
+    let mut rest = bytes.as_slice().opaque();
+    loop {
+        rest = match decoder.feed(rest) {
+            Progress::NeedsMore => break,
+            Progress::Error { error, rest } => {
+                show(error);
+                rest
+            }
+            Progress::Message { header, message, rest } => {
+                picture.apply(header, &message);
+                rest
+            }
+        };
+    }
+    black_box(decoder.counters());
+    black_box((picture.is_converged(), picture.is_complete(), picture.vertices(), picture.row(black_box(1))));
+    for edge in picture.edges() {
+        black_box(edge);
+    }
+    black_box((picture.hello(), picture.location(), picture.evidence(), picture.health()));
+    black_box((picture.neighbours(black_box(3)), picture.fault(FaultKind::BusError.opaque())));
+    if let Some(Err(error)) = picture.hello().map(|hello: Hello| hello.check()) {
+        show::<HelloError>(error);
+    }
+    let echoes = toposlam::wire::Echoes::new(&any_frame().echoes);
+    for echo in echoes.iter() {
+        black_box(echo);
+    }
 }
