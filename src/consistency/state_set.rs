@@ -51,15 +51,15 @@ impl<const WORDS: usize> StateSet<WORDS> {
     /// Adds this set to a list of minimal sets, unless one of them lies within it; those that it lies within leave.
     /// The number of sets in the list is returned, or `None` when there is no room, with nothing changed.
     pub(super) fn insert_minimal(&self, sets: &mut [Self], held: usize) -> Option<usize> {
+        if sets.iter().take(held).any(|set| self.contains_all(set)) {
+            return Some(held);
+        }
         let mut kept = 0;
         for index in 0..held {
-            let set = *sets.get(index)?;
-            if self.contains_all(&set) {
-                // Nothing left the list before: what lies within this set would have lain within that one.
-                return Some(held);
-            }
-            if !set.contains_all(self) {
-                *sets.get_mut(kept)? = set;
+            if !sets.get(index)?.contains_all(self) {
+                if kept < index {
+                    *sets.get_mut(kept)? = *sets.get(index)?;
+                }
                 kept += 1;
             }
         }
