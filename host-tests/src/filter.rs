@@ -233,19 +233,72 @@ pub fn normalised_weights(pool: &[Candidate]) -> Vec<f64> {
     pool.iter().map(|candidate| weight(candidate) / total).collect()
 }
 
-/// Which candidate each of N random numbers in [0, 1) draws: the first whose cumulative weight exceeds it.
-pub fn drawn(weights: &[f64], draws: &[f64]) -> Vec<usize> {
-    let exceeds = |draw: f64| {
-        let mut cumulative = 0.0;
-        weights.iter().position(|weight| {
-            cumulative += weight;
-            cumulative > draw
-        })
-    };
-    draws.iter().map(|&draw| exceeds(draw).unwrap_or(weights.len() - 1)).collect()
+/// How often each candidate is proposed, relative to the one that is proposed most: Eq. 7 · Eq. 9, multiplicities included.
+/// Less than `least` is never proposed.
+pub fn proposals(pool: &[Candidate], least: f64) -> Vec<f64> {
+    let ln = |candidate: &Candidate| candidate.ln_observation + candidate.ln_penalty;
+    let best = pool.iter().map(ln).fold(f64::NEG_INFINITY, f64::max);
+    let relative = |candidate: &Candidate| (ln(candidate) - best).exp();
+    let weight = |candidate: &Candidate| candidate.multiplicity as f64 * relative(candidate);
+    pool.iter().map(|candidate| if relative(candidate) < least { 0.0 } else { weight(candidate) }).collect()
 }
 
-/// **III.A, end**: the posterior, N samples of the pool. The new particles are in the order of the pool.
+/// How often a proposed candidate is accepted: Eq. 8, relative to the best one that is proposed at all.
+pub fn acceptances(pool: &[Candidate], proposals: &[f64]) -> Vec<f64> {
+    let proposed = pool.iter().zip(proposals).filter(|&(_, &weight)| weight > 0.0);
+    let best = proposed.map(|(candidate, _)| candidate.ln_consistency).fold(f64::NEG_INFINITY, f64::max);
+    pool.iter().map(|candidate| (candidate.ln_consistency - best).min(0.0).exp()).collect()
+}
+
+/// One proposal: the two random numbers in [0, 1) and what came of them.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Proposal {
+    /// The number that chose a candidate: the first whose share of the proposals, summed up in order, exceeds it.
+    pub proposing: f64,
+    /// The candidate.
+    pub candidate: usize,
+    /// The number that accepted the candidate, or did not.
+    pub accepting: f64,
+    /// Whether it was accepted: the number is below its acceptance.
+    pub accepted: bool,
+}
+
+/// **III.A, end**: N draws in proportion to the weights of Eq. 6, by rejection: a candidate is proposed in proportion to
+/// Eq. 7 · Eq. 9 and accepted in proportion to Eq. 8, until N are accepted. After `most` proposals the rest is drawn from
+/// the weights themselves, with one number each and nothing to accept.
+pub fn draw(
+    proposals: &[f64],
+    acceptances: &[f64],
+    particles: usize,
+    most: usize,
+    mut random: impl FnMut() -> f64,
+) -> Vec<Proposal> {
+    let share = |(proposal, acceptance): (&f64, &f64)| proposal * acceptance;
+    let weights: Vec<f64> = proposals.iter().zip(acceptances).map(share).collect();
+    let mut made: Vec<Proposal> = Vec::new();
+    while made.iter().filter(|proposal| proposal.accepted).count() < particles {
+        let is_sure = made.len() >= most;
+        let proposing = random();
+        let candidate = chosen_by(proposing, if is_sure { &weights } else { proposals });
+        let accepting = if is_sure { 0.0 } else { random() };
+        let accepted = is_sure || accepting < acceptances[candidate];
+        made.push(Proposal { proposing, candidate, accepting, accepted });
+    }
+    made
+}
+
+/// The first candidate whose share of the weights, summed up in order, exceeds a number in [0, 1).
+fn chosen_by(number: f64, weights: &[f64]) -> usize {
+    let total: f64 = weights.iter().sum();
+    let mut share = 0.0;
+    let exceeding = weights.iter().position(|weight| {
+        share += weight / total;
+        share > number
+    });
+    exceeding.unwrap_or(weights.len() - 1)
+}
+
+/// The posterior: N samples of the pool as particles, in the order of the pool.
 pub fn resample(pool: &[Candidate], drawn: &[usize]) -> Vec<Particle> {
     let mut counts = HashMap::new();
     for &chosen in drawn {
@@ -302,11 +355,30 @@ mod tests {
             let pool = predict(&particles, observation_mm, &evidence, &PARAMETERS);
             let weights = normalised_weights(&pool);
             assert!((weights.iter().sum::<f64>() - 1.0).abs() < 1e-12);
-            particles = resample(&pool, &drawn(&weights, &[0.5; 4]));
+            let proposals = proposals(&pool, 0.0);
+            let acceptances = acceptances(&pool, &proposals);
+            let made = draw(&proposals, &acceptances, 4, usize::MAX, || 0.5);
+            let chosen = made.iter().filter(|proposal| proposal.accepted).map(|proposal| proposal.candidate);
+            particles = resample(&pool, &chosen.collect::<Vec<_>>());
         }
         let [particle] = &particles[..] else { panic!("all draws are the same") };
         assert_eq!((particle.place, particle.multiplicity), (Some(0), 4));
         assert_eq!(particle.map.graph, Graph::with(&[1005.0, 2000.0], &[(0, 1)]));
+    }
+
+    #[test]
+    fn drawing_by_rejection_follows_the_weights() {
+        let (proposals, acceptances) = ([4.0, 1.0, 0.0, 3.0], [0.25, 1.0, 1.0, 0.5]);
+        let mut state = 1_u64;
+        let random = || {
+            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            (state >> 11) as f64 / 2_f64.powi(53)
+        };
+        let made = draw(&proposals, &acceptances, 70_000, usize::MAX, random);
+        for (candidate, weight) in [1.0 / 3.5, 1.0 / 3.5, 0.0, 1.5 / 3.5].into_iter().enumerate() {
+            let drawn = made.iter().filter(|proposal| proposal.accepted && proposal.candidate == candidate).count();
+            assert!((drawn as f64 / 70_000.0 - weight).abs() < 0.01, "{candidate}: {drawn}");
+        }
     }
 
     #[test]

@@ -8,10 +8,10 @@ use super::{Consistency, evidence::Evidence, readings::Readings, state_set::Stat
 use crate::{Map, NgramLength, map::bits};
 
 /// How many arms are held at once; more are taken in blocks.
-const BLOCK: usize = 16;
+const BLOCK: usize = 14;
 
 /// How many minimal tails of a vertex are kept; the tails of a vertex with more are read anew each time.
-const TAILS: usize = 4;
+const TAILS: usize = 6;
 
 /// A reading along some vertices, and the states it may have got to.
 #[derive(Clone, Copy, Debug)]
@@ -56,6 +56,10 @@ pub(super) struct Arms<const V: usize, const WORDS: usize> {
     tails: [[Arm<WORDS>; TAILS]; V],
     /// For each vertex, the tails it has: bits of kept ones, [`UNREAD`], or [`TOO_MANY`].
     kept: [u8; V],
+    /// For each vertex, where the reading of its label alone may go on to.
+    ahead: [StateSet<WORDS>; V],
+    /// The vertices whose `ahead` was read.
+    is_ahead: u64,
 }
 
 /// The tails of a vertex were not asked for yet.
@@ -65,7 +69,13 @@ const TOO_MANY: u8 = 1 << TAILS;
 
 impl<const V: usize, const WORDS: usize> Arms<V, WORDS> {
     pub(super) const fn new() -> Self {
-        Self { block: [Arm::NONE; BLOCK], tails: [[Arm::NONE; TAILS]; V], kept: [UNREAD; V] }
+        Self {
+            block: [Arm::NONE; BLOCK],
+            tails: [[Arm::NONE; TAILS]; V],
+            kept: [UNREAD; V],
+            ahead: [StateSet::EMPTY; V],
+            is_ahead: 0,
+        }
     }
 }
 
@@ -73,7 +83,7 @@ impl<const V: usize, const WORDS: usize, const INDICES: usize> Consistency<V, WO
     /// Whether max over the map's walks of min over the evidence of Eq. 3 is at most `distance`.
     ///
     /// Cost: O(V · A² · WORDS) with A minimal arms a vertex, A ≤ Δ^(⌈n/2⌉−1) for a largest degree of Δ; memory: a block
-    /// of 16 arms and 4 tails a vertex, whatever A is.
+    /// of 14 arms and 6 tails a vertex, whatever A is.
     pub(super) fn confirms(
         &mut self,
         map: &Map<V>,
@@ -81,12 +91,13 @@ impl<const V: usize, const WORDS: usize, const INDICES: usize> Consistency<V, WO
         length: NgramLength,
         distance: u16,
     ) -> bool {
-        let Self { readings, arms: Arms { block, tails, kept }, witnesses, .. } = self;
+        let Self { readings, arms: Arms { block, tails, kept, ahead, is_ahead }, witnesses, .. } = self;
         if witnesses.refute_walks(map, evidence, length, distance, readings) {
             return false;
         }
         kept.fill(UNREAD);
-        let mut question = Question { map, evidence, length, distance, readings, tails, kept };
+        *is_ahead = 0;
+        let mut question = Question { map, evidence, length, distance, readings, tails, kept, ahead, is_ahead };
         for vertex in 0..map.vertices() {
             if let Err(walk) = question.confirm_at(vertex, block) {
                 witnesses.remember_walk(walk);
@@ -106,6 +117,8 @@ struct Question<'a, E, const V: usize, const WORDS: usize, const INDICES: usize>
     readings: &'a mut Readings<V, WORDS, INDICES>,
     tails: &'a mut [[Arm<WORDS>; TAILS]; V],
     kept: &'a mut [u8; V],
+    ahead: &'a mut [StateSet<WORDS>; V],
+    is_ahead: &'a mut u64,
 }
 
 impl<E: Evidence<WORDS>, const V: usize, const WORDS: usize, const INDICES: usize> Question<'_, E, V, WORDS, INDICES> {
@@ -236,12 +249,23 @@ impl<E: Evidence<WORDS>, const V: usize, const WORDS: usize, const INDICES: usiz
     fn read_tail(&mut self, vertex: u8, number: u8) -> Arm<WORDS> {
         let path = [vertex, number, 0, 0];
         if self.tail_labels() == 1 {
-            let states = *self.reading(vertex, 0);
-            return Arm { states: self.evidence.around(&states), path };
+            return Arm { states: self.ahead(vertex), path };
         }
-        let states = *self.reading(number, 0);
-        let states = self.evidence.around(&states).intersection(self.reading(vertex, 1));
+        let states = self.ahead(number).intersection(self.reading(vertex, 1));
         Arm { states: self.evidence.around(&states), path }
+    }
+
+    /// Where the reading of the label of one vertex may go on to.
+    fn ahead(&mut self, vertex: u8) -> StateSet<WORDS> {
+        let bit = 1 << (vertex & 63);
+        if *self.is_ahead & bit == 0 {
+            *self.is_ahead |= bit;
+            let states = *self.reading(vertex, 0);
+            if let Some(ahead) = self.ahead.get_mut(usize::from(vertex)) {
+                *ahead = self.evidence.around(&states);
+            }
+        }
+        self.ahead.get(usize::from(vertex)).copied().unwrap_or(StateSet::EMPTY)
     }
 
     fn reading(&mut self, vertex: u8, index: u8) -> &StateSet<WORDS> {

@@ -16,7 +16,7 @@ const NOTHING: Key = Key { label: Fingerprint::ZERO, above_distance: 0 };
 
 /// How many readings are kept for a vertex and an index: one for each remainder of the distance, because the search asks
 /// about neighbouring distances in turn.
-const PLANES: usize = 4;
+const PLANES: usize = 2;
 
 /// The readings that were made last.
 #[derive(Clone, Debug)]

@@ -117,7 +117,8 @@ impl<const N: usize, const V: usize, const WORDS: usize> PaperFilter<N, V, WORDS
     }
 
     /// As [`PaperFilter::observe`], with the random draws given: for each particle in turn, one that proposes a
-    /// prediction and one that accepts or rejects it, until one is accepted.
+    /// prediction and one that accepts or rejects it, until one is accepted. After 128 proposals all predictions are
+    /// weighed in full, and one draw chooses each particle that is still missing.
     pub fn observe_with_draws(&mut self, fingerprint: Fingerprint, random: impl FnMut() -> u32) -> Update {
         self.remember(fingerprint);
         let evidence = (&self.history, &mut self.consistency);

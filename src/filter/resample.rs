@@ -6,20 +6,25 @@
 
 use crate::likelihood::NAT;
 
-/// A prediction that is this many nats below the best one is never proposed: e⁻¹⁵ · 2²⁰ rounds to 0.
+/// A prediction whose Eq. 7 · Eq. 9 is this many nats below the best one is never proposed: e⁻¹⁵ · 2²⁰ rounds to 0. A label
+/// that is 3.9 σ_l off is out of the question then, however well the map would fit the evidence.
 pub(super) const PROPOSAL_REACH: i32 = 15 * NAT;
 
 /// A proposal that fits the evidence this many nats worse than the best is never accepted: e⁻²³ · 2³² rounds to 0.
 pub(super) const ACCEPTANCE_REACH: i32 = 23 * NAT;
 
-/// How many proposals a step makes before the particles that are still missing take the heaviest of those proposed. It
-/// bounds the time of a step whose proposals hardly ever fit the evidence.
-pub(super) const PROPOSALS: u16 = 256;
+/// How much worse than the best a prediction may fit the evidence before its distance no longer matters: then its weight
+/// rounds to 0 whatever its Eq. 7 and 9 are.
+pub(super) const DISTANCE_REACH: i32 = PROPOSAL_REACH + ACCEPTANCE_REACH;
 
-/// How often a prediction is proposed, relative to the best one, in units of 2⁻²⁰ and rounded. Only ratios count, which
+/// How many proposals a step makes before it computes Eq. 8 of all predictions and draws the rest without rejecting. It
+/// bounds the time of a step whose proposals hardly ever fit the evidence.
+pub(super) const PROPOSALS: u16 = 128;
+
+/// How often a prediction is drawn, relative to the best one, in units of 2⁻²⁰ and rounded. Only ratios count, which
 /// spares the division of Eq. 4.
-pub(super) fn proposal_weight(ln_proposal: i32, ln_best: i32) -> u32 {
-    let behind = ln_best.saturating_sub(ln_proposal);
+pub(super) fn draw_weight(ln_weight: i32, ln_best: i32) -> u32 {
+    let behind = ln_best.saturating_sub(ln_weight);
     if behind >= PROPOSAL_REACH {
         return 0;
     }
@@ -48,11 +53,11 @@ mod tests {
     use super::*;
 
     #[test]
-    fn proposals_are_relative_to_the_best() {
-        assert_eq!(proposal_weight(-5 * NAT, -5 * NAT), 1 << 20);
-        assert_eq!(proposal_weight(-6 * NAT, -5 * NAT), (2_f64.powi(20) * (-1_f64).exp()).round() as u32);
-        assert_eq!(proposal_weight(-20 * NAT, -5 * NAT), 0);
-        assert_eq!(proposal_weight(i32::MIN, i32::MAX), 0);
+    fn weights_are_relative_to_the_best() {
+        assert_eq!(draw_weight(-5 * NAT, -5 * NAT), 1 << 20);
+        assert_eq!(draw_weight(-6 * NAT, -5 * NAT), (2_f64.powi(20) * (-1_f64).exp()).round() as u32);
+        assert_eq!(draw_weight(-20 * NAT, -5 * NAT), 0);
+        assert_eq!(draw_weight(i32::MIN, i32::MAX), 0);
     }
 
     #[test]

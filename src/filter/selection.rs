@@ -1,7 +1,7 @@
 //! Choosing among all predictions of all particles (Section III.A): prediction phase, weights, and the draw.
 
 use super::particles::{Candidate, Distance, Particle, WeightFactors, predict};
-use super::resample::{ACCEPTANCE_REACH, PROPOSALS, accepts, proposal_weight, target};
+use super::resample::{DISTANCE_REACH, PROPOSALS, accepts, draw_weight, target};
 use crate::consistency::{Consistency, Direction, Evidence};
 use crate::likelihood::Likelihood;
 use crate::{Fingerprint, Map, NgramLength};
@@ -47,7 +47,7 @@ impl<E: Evidence<WORDS>, const N: usize, const V: usize, const WORDS: usize, con
         }
         for ((parent, candidates), weights) in self.parents.iter().zip(self.pool.iter()).zip(&mut self.weights) {
             for ((_, candidate), weight) in (0..=parent.map.vertices()).zip(candidates).zip(weights) {
-                *weight = proposal_weight(candidate.ln_proposal, ln_best) * u32::from(parent.multiplicity);
+                *weight = draw_weight(candidate.ln_proposal, ln_best) * u32::from(parent.multiplicity);
             }
         }
     }
@@ -101,30 +101,49 @@ impl<E: Evidence<WORDS>, const N: usize, const V: usize, const WORDS: usize, con
 
     /// N independent draws, each prediction in proportion to its weight (Eq. 6, normalised by Eq. 4).
     pub(super) fn draw(&mut self, chosen: &mut [Choice], mut random: impl FnMut() -> u32) {
-        let total: u64 = self.weights().map(|(_, weight)| weight).sum();
-        let mut heaviest: Option<(i32, Choice)> = None;
+        let mut total = self.total();
         let mut proposals = 0;
         for slot in chosen {
             loop {
                 if proposals == PROPOSALS {
-                    *slot = heaviest.map_or(*slot, |(_, choice)| choice);
-                    break;
+                    self.weigh_all();
+                    total = self.total();
                 }
-                proposals += 1;
+                proposals = proposals.saturating_add(1);
                 let Some(choice) = self.propose(target(random(), total)) else { break };
-                let behind = self.ln_behind(choice);
-                let ln_weight = self.ln_proposal(choice).saturating_sub(behind);
-                if heaviest.is_none_or(|(ln_heaviest, other)| {
-                    ln_weight > ln_heaviest || (ln_weight == ln_heaviest && choice < other)
-                }) {
-                    heaviest = Some((ln_weight, choice));
-                }
-                if accepts(random(), behind) {
+                if proposals > PROPOSALS || accepts(random(), self.ln_behind(choice)) {
                     *slot = choice;
                     break;
                 }
             }
         }
+    }
+
+    /// Weighs every prediction by all of Eq. 6, so that what is proposed from now on need not be accepted.
+    fn weigh_all(&mut self) {
+        let mut ln_best = i32::MIN;
+        for pass in 0..2 {
+            for (index, parent) in (0_u8..).zip(self.parents) {
+                for vertex in 0..=parent.map.vertices() {
+                    let choice = Choice { parent: index, vertex };
+                    if self.weight(choice) == 0 {
+                        continue;
+                    }
+                    let ln_weight = self.ln_proposal(choice).saturating_sub(self.ln_behind(choice));
+                    ln_best = ln_best.max(ln_weight);
+                    let weights = self.weights.get_mut(usize::from(index));
+                    if let Some(weight) = weights.and_then(|weights| weights.get_mut(usize::from(vertex)))
+                        && pass == 1
+                    {
+                        *weight = draw_weight(ln_weight, ln_best) * u32::from(parent.multiplicity);
+                    }
+                }
+            }
+        }
+    }
+
+    fn total(&self) -> u64 {
+        self.weights().map(|(_, weight)| weight).sum()
     }
 
     /// The consistency of a prediction that was chosen, in millimetres, and the factors of its weight.
@@ -205,7 +224,7 @@ impl<E: Evidence<WORDS>, const N: usize, const V: usize, const WORDS: usize, con
             return known;
         }
         let step_mm = self.length.label_step_mm();
-        let loss = ACCEPTANCE_REACH.saturating_sub(self.likelihood.ln_consistency(self.nearest_mm));
+        let loss = DISTANCE_REACH.saturating_sub(self.likelihood.ln_consistency(self.nearest_mm));
         let limit = (self.likelihood.consistency_reach_mm(loss) / step_mm).min(self.farthest_steps());
         let distance = match self.search(choice, (self.nearest_mm / step_mm, limit)) {
             None if limit < self.farthest_steps() => Distance::TooLarge,

@@ -28,6 +28,12 @@ pub fn penalty_tolerance(parameters: &Parameters) -> f64 {
 
 /// By how much a weight may be off, relative to the best one: it is rounded to this.
 pub const WEIGHT_STEP: f64 = 1.0 / (1 << 20) as f64;
+/// Less than this, relative to the best one, is never proposed: it rounds to no step.
+pub const LEAST_PROPOSAL: f64 = WEIGHT_STEP / 2.0;
+/// By how much an acceptance may be off besides its logarithm: it is a single-precision number.
+pub const ACCEPTANCE_STEP: f64 = 1.0 / (1 << 22) as f64;
+/// After so many proposals for one place the core weighs all candidates in full.
+pub const MOST_PROPOSALS: usize = 128;
 /// Eq. 7 and 8 do not fall below e to the minus this in the core.
 pub const LARGEST_LOSS: f64 = 4096.0;
 
@@ -146,19 +152,20 @@ impl Drive {
 
     /// One place for both filters; panics where they differ.
     pub fn observe(&mut self, observation_mm: f64, random: &mut Random) {
-        let draws: [u32; PARTICLES] = std::array::from_fn(|_| (random.bits() >> 32) as u32);
+        let mut of_reference = Random(random.0);
+        let draws = || (random.bits() >> 32) as u32;
         self.history_mm.push(observation_mm);
         let observation = fingerprint(observation_mm);
         let (update, evidence) = match &mut self.prior {
-            Some((prior, grams)) => (self.core.observe_with_prior_and_draws(observation, prior, &draws), grams.clone()),
+            Some((prior, grams)) => (self.core.observe_with_prior_and_draws(observation, prior, draws), grams.clone()),
             None => {
                 let kept = &self.history_mm[self.history_mm.len().saturating_sub(32 * WORDS)..];
-                (self.core.observe_with_draws(observation, &draws), self.parameters.grams_of_history(kept))
+                (self.core.observe_with_draws(observation, draws), self.parameters.grams_of_history(kept))
             }
         };
         let pool = filter::predict(&self.particles, observation_mm, &evidence, &self.parameters);
         let chosen = self.chosen_by_the_core(&pool);
-        self.check_choice(&pool, &chosen, &draws);
+        self.check_choice(&pool, &chosen, || unit((of_reference.bits() >> 32) as u32));
         self.check_update(&pool, &chosen, update);
         self.particles = filter::resample(&pool, &chosen);
         self.check_particles(&pool);
@@ -186,43 +193,60 @@ impl Drive {
         self.core.particles().iter().flat_map(repeated).collect()
     }
 
-    /// Every draw has the reference's candidate, or lies so close to a boundary that the tolerance does not tell.
-    ///
-    /// A larger draw never has an earlier candidate, so the sorted draws belong to the sorted candidates.
-    fn check_choice(&mut self, pool: &[Candidate], chosen: &[usize], draws: &[u32; PARTICLES]) {
-        let mut draws: Vec<f64> = draws[..self.parameters.particles].iter().map(|&draw| unit(draw)).collect();
-        draws.sort_by(f64::total_cmp);
-        let weights = filter::normalised_weights(pool);
-        let expected = filter::drawn(&weights, &draws);
-        assert_eq!(chosen.len(), draws.len(), "all draws have a candidate");
-        let boundaries = self.boundaries(pool, &weights);
-        for ((&draw, &expected), &chosen) in draws.iter().zip(&expected).zip(chosen) {
-            let (below, above) = (boundaries[chosen], boundaries[chosen + 1]);
-            assert!(
-                below.0 - below.1 <= draw && draw <= above.0 + above.1,
-                "draw {draw} chose candidate {chosen}, not {expected}, of {weights:?} with {:?}",
-                self.config
-            );
-            let is_tie = boundaries.iter().any(|(boundary, tolerance)| (draw - boundary).abs() <= *tolerance);
-            self.tally.draws += 1;
-            self.tally.ties += usize::from(is_tie);
-            self.tally.differing += usize::from(chosen != expected);
-        }
+    /// The reference chooses the same candidates with the same random numbers, unless one of them lies so close to a
+    /// boundary that the tolerance does not tell.
+    fn check_choice(&mut self, pool: &[Candidate], chosen: &[usize], random: impl FnMut() -> f64) {
+        let proposals = filter::proposals(pool, LEAST_PROPOSAL);
+        let acceptances = filter::acceptances(pool, &proposals);
+        let weights: Vec<f64> = proposals.iter().zip(&acceptances).map(|(a, b)| a * b).collect();
+        let made = filter::draw(&proposals, &acceptances, self.parameters.particles, MOST_PROPOSALS, random);
+        let mut expected: Vec<usize> =
+            made.iter().filter(|proposal| proposal.accepted).map(|proposal| proposal.candidate).collect();
+        expected.sort_unstable();
+        assert_eq!(chosen.len(), expected.len(), "all draws have a candidate");
+        let (proposing, sure) = (self.boundaries(pool, &proposals), self.boundaries(pool, &weights));
+        let is_tie = self.floor_is_close(pool)
+            || made.iter().enumerate().any(|(number, proposal)| {
+                let boundaries = if number < MOST_PROPOSALS { &proposing } else { &sure };
+                let near = |&(boundary, tolerance): &(f64, f64)| (proposal.proposing - boundary).abs() <= tolerance;
+                let acceptance = acceptances[proposal.candidate];
+                let tolerance = acceptance * self.tolerance_of_weight(&pool[proposal.candidate]) + ACCEPTANCE_STEP;
+                boundaries.iter().any(near)
+                    || (number < MOST_PROPOSALS
+                        && acceptance < 1.0
+                        && (proposal.accepting - acceptance).abs() <= tolerance)
+            });
+        self.tally.draws += made.len();
+        self.tally.ties += usize::from(is_tie);
+        self.tally.differing += usize::from(chosen != expected);
+        assert!(
+            is_tie || chosen == expected,
+            "{chosen:?}, not {expected:?}, of {proposals:?} accepted with {acceptances:?} after {made:?} with {:?}",
+            self.config
+        );
     }
 
-    /// Where one candidate's share of the draws ends and the next one's begins, and by how much that may be off.
+    /// Whether a candidate is so close to the least that is proposed that it may be proposed or not.
+    fn floor_is_close(&self, pool: &[Candidate]) -> bool {
+        let sure = filter::proposals(pool, LEAST_PROPOSAL * 1.001);
+        let possible = filter::proposals(pool, LEAST_PROPOSAL * 0.999);
+        sure.iter().zip(&possible).any(|(sure, possible)| sure != possible)
+    }
+
+    /// Where one candidate's share of the proposals ends and the next one's begins, and by how much that may be off.
     ///
     /// When all logarithms are off by at most ε, a share c of the sum is off by at most 2 ε c (1 − c); the rounding of the
     /// weights comes on top.
-    fn boundaries(&self, pool: &[Candidate], weights: &[f64]) -> Vec<(f64, f64)> {
-        let drawable = pool.iter().zip(weights).filter(|&(_, &weight)| weight > 1e-7);
-        let epsilon = drawable.map(|(candidate, _)| self.tolerance_of_weight(candidate)).fold(0.0, f64::max);
+    fn boundaries(&self, pool: &[Candidate], proposals: &[f64]) -> Vec<(f64, f64)> {
+        let proposed = pool.iter().zip(proposals).filter(|&(_, &weight)| weight > 0.0);
+        let epsilon = proposed.map(|(candidate, _)| self.tolerance_of_weight(candidate)).fold(0.0, f64::max);
+        let total: f64 = proposals.iter().sum();
         let multiplicities: usize = pool.iter().map(|candidate| candidate.multiplicity).sum();
-        let rounding = WEIGHT_STEP / 2.0 * multiplicities as f64;
+        let rounding = WEIGHT_STEP / 2.0 * multiplicities as f64 / total.max(1.0);
         let mut share = 0.0;
         let mut boundaries = vec![(0.0, rounding)];
-        for weight in weights {
-            share += weight;
+        for weight in proposals {
+            share += weight / total;
             boundaries.push((share, 2.0 * epsilon * share * (1.0 - share).max(0.0) + rounding));
         }
         boundaries
@@ -243,20 +267,26 @@ impl Drive {
             candidates.sort_by(|a, b| a.ln_weight().total_cmp(&b.ln_weight()));
             candidates
         };
-        let (lead, tolerance) = match ascending(&mut (0..pool.len()))[..] {
-            [.., second, best] => (
-                (best.ln_weight() - second.ln_weight()).min(15.0),
-                self.tolerance_of_weight(best) + self.tolerance_of_weight(second),
-            ),
-            _ => (15.0, 0.0),
-        };
-        assert!((nats(update.lead_q16) - lead).abs() <= tolerance, "{update:?} {lead} {:?}", self.config);
         let best = self.core.best();
         let of_chosen = ascending(&mut chosen.iter().copied());
         let heaviest = of_chosen[of_chosen.len() - 1];
         let difference = nats(best.factors.ln_weight_q16()) - heaviest.ln_weight();
         assert!(difference.abs() <= self.tolerance_of_weight(heaviest), "{update:?} {difference}");
         assert_eq!((update.vertex, update.factors), (best.place, best.factors));
+        // The lead that is told is a bound on the true one, at which the rivals are as near to the evidence as any.
+        let proposals = filter::proposals(pool, LEAST_PROPOSAL * 1.1);
+        let rivals = || {
+            let is_rival =
+                |candidate: &Candidate| (candidate.parent, candidate.vertex) != (heaviest.parent, heaviest.vertex);
+            pool.iter()
+                .zip(&proposals)
+                .filter(move |&(rival, &weight)| weight > 0.0 && is_rival(rival))
+                .map(|(rival, _)| rival)
+        };
+        let tolerance = pool.iter().map(|candidate| 2.0 * self.tolerance_of_weight(candidate)).fold(0.0, f64::max);
+        let heaviest_rival = rivals().map(Candidate::ln_weight).fold(f64::NEG_INFINITY, f64::max);
+        let lead = (heaviest.ln_weight() - heaviest_rival).min(15.0);
+        assert!(nats(update.lead_q16) <= lead + tolerance, "{update:?} {lead} {:?}", self.config);
         assert_eq!(update.is_new, best.map.visits(best.place) == 1);
     }
 
