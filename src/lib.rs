@@ -15,6 +15,8 @@
 #![forbid(unsafe_code)]
 
 mod consistency;
+#[cfg(feature = "defmt")]
+mod defmt;
 mod fault;
 mod filter;
 mod fingerprint;
