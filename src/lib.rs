@@ -93,7 +93,7 @@
 //! | `WORDS` of a [`History`] | 32 places each | powers of two | 8: 256 places |
 //! | `WORDS` of an [`NgramTable`] or [`Prior`] | 16 n-grams each | even numbers up to 1024 | none: it maps on line |
 //!
-//! Each type states its size as a function of these. [`reference`] has the capacities of the reference robot. What does
+//! Each type states its size as a function of these. [`mod@reference`] has the capacities of the reference robot. What does
 //! not fit is counted as a [`FaultKind`], and the map so far stays; the oldest places of a full history make room.
 //!
 //! # Determinism

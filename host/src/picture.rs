@@ -177,6 +177,7 @@ fn words(words: &str, x: f64, y: f64, size_mm: f64) -> Text {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use toposlam::{Fingerprint, place::Place};
 
     #[test]
     fn a_picture_holds_every_vertex_edge_and_way_and_its_words_are_escaped() {
@@ -190,5 +191,23 @@ mod tests {
         assert_eq!(picture.matches("<line").count(), truth.edges.len());
         assert_eq!(picture.matches("<circle").count(), 2 * truth.nodes.len() + 1);
         assert!(picture.contains("a &lt; b &amp; c"));
+    }
+
+    #[test]
+    fn vertices_in_one_spot_are_drawn_side_by_side_around_it() {
+        let vertex = |x_mm| Vertex { position: Point::new(x_mm, 0.0), radius_mm: 1.0, name: String::new() };
+        let points = spread(&[vertex(0.0), vertex(9000.0), vertex(10.0), vertex(20.0)]);
+        let xs_mm: Vec<f64> = points.iter().map(|point| point.x_mm).collect();
+        assert_eq!(xs_mm, [-SIDE_BY_SIDE_MM, 9000.0, 0.0, SIDE_BY_SIDE_MM]);
+    }
+
+    #[test]
+    fn a_vertex_is_drawn_at_the_node_it_was_mostly_taken_for() {
+        let fingerprint = Fingerprint::from_radius_mm(1000).unwrap();
+        let place = Place { fingerprint, frame_index: 0, degree: None, spread_mm: 0 };
+        let visit = |x_mm, node| Detection { place, position: Point::new(x_mm, 0.0), node };
+        let visits = [visit(100.0, Some(3)), visit(9000.0, Some(1)), visit(300.0, Some(3)), visit(5000.0, None)];
+        assert_eq!(mostly_at(&visits), Point::new(200.0, 0.0));
+        assert_eq!(mostly_at(&[]), Point::new(0.0, 0.0));
     }
 }
