@@ -113,7 +113,7 @@
 //! | Eq. 1, labels | `fingerprint.rs`, as running means `map.rs` |
 //! | Definitions 3 to 5, n-grams | `ngram/mod.rs`, `ngram/table.rs` |
 //! | Definition 6, Eq. 2 and 3, consistency | `consistency/` |
-//! | Eq. 4 and 5, the filter's step | `filter/particles.rs`, `filter/resample.rs` |
+//! | Eq. 4 and 5, the filter's step | `filter/selection.rs`, `filter/resample.rs` |
 //! | Eq. 6 to 9, weights | `likelihood.rs` |
 //! | Section III.B, localisation | `filter/mod.rs` ([`Update::vertex`]) |
 //! | Section IV.A, meet points | `place/` |
