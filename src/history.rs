@@ -6,6 +6,18 @@ use crate::Fingerprint;
 ///
 /// A position of the ring is also a bit of a state set of `WORDS` 32-bit words, which is what the consistency measure
 /// computes with; hence the unit of the capacity.
+///
+/// ```
+/// use toposlam::{Fingerprint, History};
+///
+/// let mut history = History::<8>::new();
+/// for radius_mm in [1200, 800, 1500] {
+///     history.push(Fingerprint::from_radius_mm(radius_mm)?);
+/// }
+/// assert_eq!(history.newest(0).map(Fingerprint::radius_mm), Some(1500));
+/// assert_eq!((history.len(), History::<8>::CAPACITY), (3, 256));
+/// # Ok::<(), toposlam::FingerprintError>(())
+/// ```
 #[derive(Clone, Debug)]
 pub struct History<const WORDS: usize> {
     slots: [[Fingerprint; 32]; WORDS],

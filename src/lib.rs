@@ -9,12 +9,120 @@
 //! ```
 //!
 //! The crate never allocates and holds no unsafe code. Capacities are const generics, big state is const-constructed
-//! (so a `static` of it lies in `.bss`) and initialised in place. The same input, configuration and seed give the
-//! same result, bit for bit, on every target.
+//! (so a `static` of it lies in `.bss`) and initialised in place.
+//!
+//! # From ring frames to a map
+//!
+//! ```
+//! use toposlam::place::{PlaceConfig, PlaceDetector};
+//! use toposlam::ring::{Echo, RingFrame, RingGeometry};
+//! use toposlam::{Config, PaperFilter};
+//!
+//! /// What a ring of 16 sonars hears in a corridor that ends ahead.
+//! fn frame(half_width_mm: u16, ahead_mm: u16) -> RingFrame<16> {
+//!     let mut echoes = [Echo::Silence; 16];
+//!     for (sensor, range_mm) in [(0, ahead_mm), (4, half_width_mm), (12, half_width_mm)] {
+//!         echoes[sensor] = Echo::Range { range_mm };
+//!     }
+//!     RingFrame { echoes }
+//! }
+//!
+//! let mut detector = PlaceDetector::<16>::new();
+//! detector.start(PlaceConfig::DEFAULT, RingGeometry::even())?;
+//! let mut filter = PaperFilter::<10, 16, 8>::new();
+//! filter.start(Config::DEFAULT, 1)?;
+//!
+//! // To and fro between the ends of a corridor that is 1.6 m wide at one end and 2.4 m at the other.
+//! for half_width_mm in [800, 1200, 800, 1200, 800] {
+//!     for step in -50_i16..=50 {
+//!         let ahead_mm = half_width_mm + 30 * step.unsigned_abs();
+//!         if let Some(place) = detector.observe(&frame(half_width_mm, ahead_mm)) {
+//!             let update = filter.observe(place.fingerprint);
+//!             println!("{} mm: vertex {}", place.fingerprint.radius_mm(), update.vertex);
+//!         }
+//!     }
+//! }
+//! assert_eq!(filter.observed(), 5);
+//! assert_eq!(filter.map().vertices(), 2);
+//! assert!(filter.map().edges().eq([(0, 1)]));
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+//!
+//! With the feature `wire`, `Mapper` is these stages and the sender of the serial protocol in one piece.
+//!
+//! # How well a map fits
+//!
+//! [`Consistency`] is the measure of Eq. 2 on its own, for any [`Map`] and any [`History`] or [`NgramTable`]:
+//!
+//! ```
+//! use toposlam::{Consistency, Direction, Fingerprint, History, Map, NgramLength};
+//!
+//! let mut map = Map::<2>::new();
+//! let mut history = History::<1>::new();
+//! for radius_mm in [1200, 800] {
+//!     map.add_vertex(Fingerprint::from_radius_mm(radius_mm)?)?;
+//!     history.push(Fingerprint::from_radius_mm(radius_mm)?);
+//! }
+//! map.add_edge(0, 1);
+//! let length = NgramLength::new(5)?;
+//! let mut consistency = Consistency::<2, 1, 1>::new();
+//! assert_eq!(consistency.distance_steps(&map, &history, length, Direction::TwoSided), Some(0));
+//! // The robot finds a place that the map does not have, 100 mm wider than the one it has.
+//! history.push(Fingerprint::from_radius_mm(1300)?);
+//! let distance = consistency.distance_steps(&map, &history, length, Direction::TwoSided);
+//! assert_eq!(distance.map(|steps| steps * length.label_step_mm()), Some(100));
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+//!
+//! # Features
+//!
+//! | Feature | Adds |
+//! |---|---|
+//! | none | everything but the lines below: detector, filter, n-grams, consistency, drivers of the sonars |
+//! | `wire` | the serial protocol (module `wire`) and `Mapper`, all stages in one |
+//! | `defmt` | `defmt::Format` for what a firmware logs |
+//! | `firmware`, `pll` | the images in `src/bin`; only for the reference board's target |
+//!
+//! # Capacities and memory
+//!
+//! | Parameter | Means | Range | Reference robot |
+//! |---|---|---|---|
+//! | `SONARS` | sensors of the ring | 3 to 128 | 16 |
+//! | `N` | particles | 1 to 255 | 10 |
+//! | `V` | vertices of a map | 1 to 64 | 16 |
+//! | `WORDS` of a [`History`] | 32 places each | powers of two | 8: 256 places |
+//! | `WORDS` of an [`NgramTable`] or [`Prior`] | 16 n-grams each | even numbers up to 1024 | none: it maps on line |
+//!
+//! Each type states its size as a function of these. [`mod@reference`] has the capacities of the reference robot. What does
+//! not fit is counted as a [`FaultKind`], and the map so far stays; the oldest places of a full history make room.
+//!
+//! # Determinism
+//!
+//! The same input, configuration and seed give the same result, bit for bit, on every target: weights are sums of integer
+//! logarithms, the random draws of a place are a function of the seed and the number of the place, and where an
+//! exponential or a logarithm is needed, `libm` computes it in software. `toposlam emulate` holds the firmware to a host:
+//! the location at every place, and the whole map at the end.
+//!
+//! # Where the paper is
+//!
+//! F. Werner, F. Maire, J. Sitte, H. Choset, S. Tully, G. Kantor: *Topological SLAM using Neighbourhood Information of
+//! Places*. All numbers of equations, definitions and sections are its own.
+//!
+//! | Paper | File |
+//! |---|---|
+//! | Eq. 1, labels | `fingerprint.rs`, as running means `map.rs` |
+//! | Definitions 3 to 5, n-grams | `ngram/mod.rs`, `ngram/table.rs` |
+//! | Definition 6, Eq. 2 and 3, consistency | `consistency/` |
+//! | Eq. 4 and 5, the filter's step | `filter/selection.rs`, `filter/resample.rs` |
+//! | Eq. 6 to 9, weights | `likelihood.rs` |
+//! | Section III.B, localisation | `filter/mod.rs` ([`Update::vertex`]) |
+//! | Section IV.A, meet points | `place/` |
 #![cfg_attr(not(test), no_std)]
 #![forbid(unsafe_code)]
 
 mod consistency;
+#[cfg(feature = "defmt")]
+mod defmt;
 mod fault;
 mod filter;
 mod fingerprint;
@@ -40,3 +148,8 @@ pub use map::{Map, VerticesFull};
 #[cfg(feature = "wire")]
 pub use mapper::{Mapper, MapperConfig, MapperError};
 pub use ngram::{Ngram, NgramError, NgramLength, NgramTable, NgramsFull};
+
+/// The code in the README is compiled as a test.
+#[cfg(all(doctest, feature = "wire"))]
+#[doc = include_str!("../README.md")]
+struct Readme;

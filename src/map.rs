@@ -41,6 +41,19 @@ impl Label {
 ///
 /// Adjacency is one bit row a vertex: bit `w` of row `v` says that an edge joins `v` and `w`. An edge from a vertex to
 /// itself is a corridor that leads back to the place it left. Memory: 18 bytes a vertex.
+///
+/// ```
+/// use toposlam::{Fingerprint, Map};
+///
+/// let mut map = Map::<16>::new();
+/// let hall = map.add_vertex(Fingerprint::from_radius_mm(1200)?)?;
+/// let office = map.add_vertex(Fingerprint::from_radius_mm(800)?)?;
+/// map.add_edge(hall, office);
+/// map.observe(hall, Fingerprint::from_radius_mm(1208)?);
+/// assert_eq!(map.label(hall).map(Fingerprint::radius_mm), Some(1204));
+/// assert!(map.edges().eq([(hall, office)]));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Map<const V: usize> {
     vertices: u8,

@@ -25,6 +25,16 @@ impl Echo {
 }
 
 /// One reading of a ring of `SONARS` sensors, in the order of the ring's [`RingGeometry`].
+///
+/// ```
+/// use toposlam::ring::{Echo, RingFrame};
+///
+/// let mut frame = RingFrame { echoes: [Echo::Silence; 16] };
+/// frame.echoes[0] = Echo::Range { range_mm: 1200 };
+/// frame.echoes[5] = Echo::Dead;
+/// let nearest_mm = frame.echoes.iter().filter_map(|echo| echo.range_mm()).min();
+/// assert_eq!(nearest_mm, Some(1200));
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct RingFrame<const SONARS: usize> {
     /// One echo for each sensor.

@@ -91,11 +91,13 @@ fn the_real_recording_gives_places_whose_radius_fits_its_room() {
     let ring = Ring::parse(include_str!("../../host/rings/scitos-g5.toml")).unwrap();
     let frames = ring.read(recording).unwrap();
     assert_eq!(frames.len(), 5456);
-    let (places, faults) = ring.replay(&frames, PlaceConfig::DEFAULT).unwrap();
+    let mut detector = PlaceDetector::new();
+    detector.start(PlaceConfig::DEFAULT, ring.geometry()).unwrap();
+    let places: Vec<_> = frames.iter().filter_map(|frame| detector.observe(frame)).collect();
     // Six laps along the walls of one room, 5 m at most across its free parts.
     assert!((6..=30).contains(&places.len()), "{places:?}");
     assert!(places.iter().all(|place| (300..2500).contains(&place.fingerprint.radius_mm())), "{places:?}");
-    assert_eq!(faults.of(FaultKind::RingBlind), 0);
+    assert_eq!(detector.faults().of(FaultKind::RingBlind), 0);
 }
 
 fn any_echo() -> impl Strategy<Value = Echo> {

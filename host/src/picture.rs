@@ -1,5 +1,7 @@
 //! Pictures: a map over its floor plan, as SVG.
 
+use std::cmp::Reverse;
+
 use svg::Document;
 use svg::node::element::{Circle, Group, Line, Path, Polyline, Rectangle, Text, Title, path::Data};
 
@@ -9,12 +11,12 @@ use crate::world::{Detection, Plan, Point, TrueMap};
 /// A vertex of the map to be drawn.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Vertex {
-    /// Where it is drawn; for a map without coordinates, the mean true position at its visits.
+    /// Where it belongs; vertices in the same spot are drawn side by side.
     pub position: Point,
     /// The radius of its fingerprint, in millimetres.
     pub radius_mm: f64,
-    /// What is written at it.
-    pub label: String,
+    /// What is written on it.
+    pub name: String,
 }
 
 /// A map to be drawn.
@@ -29,28 +31,19 @@ pub struct Drawing {
 }
 
 impl Drawing {
-    /// A map as a drawing, each vertex at the mean true position of the places that were taken for it.
+    /// A map as a drawing, each vertex where the true node is that it was mostly taken for.
     pub fn of_mapping<const SONARS: usize>(
         mapping: &Mapping<SONARS>,
         detections: &[Detection],
         caption: String,
     ) -> Self {
         let map = mapping.map();
-        let visits_of = |vertex: u8| {
-            let visits =
-                mapping.path().iter().zip(detections).filter(move |&(&visited, _)| visited == usize::from(vertex));
-            visits.map(|(_, detection)| detection.position)
-        };
-        let vertices = (0..map.vertices()).map(|vertex| {
-            let visits = visits_of(vertex).count().max(1) as f64;
-            let radius_mm = map.label(vertex).map_or(0, |label| label.radius_mm());
+        let vertices = (0..map.vertices()).zip(map.labels()).map(|(vertex, label)| {
+            let visits = mapping.path().iter().zip(detections).filter(|&(&visited, _)| visited == usize::from(vertex));
             Vertex {
-                position: Point {
-                    x_mm: visits_of(vertex).map(|position| position.x_mm).sum::<f64>() / visits,
-                    y_mm: visits_of(vertex).map(|position| position.y_mm).sum::<f64>() / visits,
-                },
-                radius_mm: radius_mm.into(),
-                label: format!("{vertex}: {:.2} m", f64::from(radius_mm) / 1000.0),
+                position: mostly_at(&visits.map(|(_, detection)| *detection).collect::<Vec<_>>()),
+                radius_mm: label.radius_mm().into(),
+                name: vertex.to_string(),
             }
         });
         let edges = map.edges().map(|(a, b)| (usize::from(a), usize::from(b))).collect();
@@ -62,24 +55,57 @@ impl Drawing {
         let vertices = map.nodes.iter().enumerate().map(|(index, node)| Vertex {
             position: node.position,
             radius_mm: node.radius_mm,
-            label: format!("{index}: {:.2} m", node.radius_mm / 1000.0),
+            name: index.to_string(),
         });
         let edges = map.edges.iter().map(|edge| (edge.nodes[0], edge.nodes[1])).collect();
         Self { vertices: vertices.collect(), edges, caption }
     }
 }
 
+/// The mean position of the visits at the node that most of them were at.
+fn mostly_at(visits: &[Detection]) -> Point {
+    let at = |node: Option<usize>| visits.iter().filter(move |visit| visit.node == node);
+    let node = visits.iter().map(|visit| visit.node).max_by_key(|node| (at(*node).count(), Reverse(*node)));
+    let count = node.map_or(1, |node| at(node).count()) as f64;
+    let positions = node.into_iter().flat_map(|node| at(node).map(|visit| visit.position));
+    let (x_mm, y_mm) = positions.fold((0.0, 0.0), |(x_mm, y_mm), at| (x_mm + at.x_mm, y_mm + at.y_mm));
+    Point::new(x_mm / count, y_mm / count)
+}
+
 const MARGIN_MM: f64 = 600.0;
 const MAP_COLOUR: &str = "#b3261e";
+const DOT_MM: f64 = 330.0;
+/// Vertices nearer than this to each other are drawn this far apart.
+const SIDE_BY_SIDE_MM: f64 = 1100.0;
 
-/// Draws a map over its floor plan: walls grey, the true Voronoi graph faint, each vertex with the disc of its radius.
+/// Where each vertex is drawn: those in one spot in a row, so that none hides another.
+fn spread(vertices: &[Vertex]) -> Vec<Point> {
+    let mut spots: Vec<(Point, Vec<usize>)> = Vec::new();
+    for (index, vertex) in vertices.iter().enumerate() {
+        match spots.iter_mut().find(|(spot, _)| spot.distance_mm(vertex.position) < SIDE_BY_SIDE_MM) {
+            Some((_, members)) => members.push(index),
+            None => spots.push((vertex.position, vec![index])),
+        }
+    }
+    let mut points: Vec<Point> = vertices.iter().map(|vertex| vertex.position).collect();
+    for (spot, members) in &spots {
+        let middle = (members.len() - 1) as f64 / 2.0;
+        for (place, member) in members.iter().enumerate() {
+            points[*member] = Point::new(spot.x_mm + (place as f64 - middle) * SIDE_BY_SIDE_MM, spot.y_mm);
+        }
+    }
+    points
+}
+
+/// Draws a map over its floor plan: walls grey, the true Voronoi graph blue, each vertex with its name, its radius and
+/// the disc of that radius.
 ///
 /// One unit of the picture is 1 mm of the building; edges of the map that name no vertex are left out.
 pub fn draw(plan: &Plan, truth: &TrueMap, drawing: &Drawing) -> String {
     let (width_mm, height_mm) = (plan.width_mm(), plan.height_mm());
     // The building's y axis points up, the picture's down.
     let at = |point: Point| (point.x_mm, height_mm - point.y_mm);
-    let mut document = Document::new()
+    let document = Document::new()
         .set("viewBox", (0, 0, width_mm, height_mm + 2.0 * MARGIN_MM))
         .set("width", width_mm / 25.0)
         .set("font-family", "sans-serif")
@@ -91,32 +117,33 @@ pub fn draw(plan: &Plan, truth: &TrueMap, drawing: &Drawing) -> String {
             edge.way.iter().map(|point| at(*point)).map(|(x, y)| format!("{x:.0},{y:.0}")).collect();
         ways = ways.add(Polyline::new().set("points", points.join(" ")));
     }
-    document = document.add(ways);
+    let document = document.add(ways);
+    let points: Vec<(f64, f64)> = spread(&drawing.vertices).into_iter().map(at).collect();
     let mut edges = Group::new().set("fill", "none").set("stroke", MAP_COLOUR).set("stroke-width", 90);
     for (from, to) in &drawing.edges {
-        let (Some(from), Some(to)) = (drawing.vertices.get(*from), drawing.vertices.get(*to)) else { continue };
-        let ((x1, y1), (x2, y2)) = (at(from.position), at(to.position));
+        let (Some((x1, y1)), Some((x2, y2))) = (points.get(*from), points.get(*to)) else { continue };
         edges = if from == to {
-            edges.add(Circle::new().set("cx", x1).set("cy", y1 - 350.0).set("r", 350))
+            edges.add(Circle::new().set("cx", *x1).set("cy", y1 - DOT_MM).set("r", DOT_MM))
         } else {
-            edges.add(Line::new().set("x1", x1).set("y1", y1).set("x2", x2).set("y2", y2))
+            edges.add(Line::new().set("x1", *x1).set("y1", *y1).set("x2", *x2).set("y2", *y2))
         };
     }
-    document = document.add(edges);
-    for vertex in &drawing.vertices {
-        let (x, y) = at(vertex.position);
-        let disc = Circle::new().set("cx", x).set("cy", y).set("r", vertex.radius_mm);
-        document = document
-            .add(
-                disc.set("fill", MAP_COLOUR)
-                    .set("fill-opacity", 0.12)
-                    .set("stroke", MAP_COLOUR)
-                    .set("stroke-width", 25),
-            )
-            .add(Circle::new().set("cx", x).set("cy", y).set("r", 180).set("fill", MAP_COLOUR))
-            .add(words(&vertex.label, x + 250.0, y - 250.0, 420.0));
+    let mut discs = Group::new().set("fill", MAP_COLOUR).set("fill-opacity", 0.08).set("stroke", MAP_COLOUR);
+    let mut dots = Group::new().set("text-anchor", "middle");
+    for (vertex, (x, y)) in drawing.vertices.iter().zip(points) {
+        let (disc_x, disc_y) = at(vertex.position);
+        discs = discs.add(Circle::new().set("cx", disc_x).set("cy", disc_y).set("r", vertex.radius_mm));
+        let radius = words(&format!("{:.2} m", vertex.radius_mm / 1000.0), x, y + DOT_MM + 320.0, 300.0);
+        dots = dots
+            .add(Circle::new().set("cx", x).set("cy", y).set("r", DOT_MM).set("fill", MAP_COLOUR))
+            .add(words(&vertex.name, x, y + 130.0, 380.0).set("fill", "white"))
+            // A white rim keeps the words legible over the edges.
+            .add(radius.set("stroke", "white").set("stroke-width", 90).set("paint-order", "stroke"));
     }
     document
+        .add(discs.set("stroke-width", 25))
+        .add(edges)
+        .add(dots)
         .add(words(&drawing.caption, 300.0, height_mm + 1.3 * MARGIN_MM, 520.0))
         .add(Title::new(&*drawing.caption))
         .to_string()
@@ -150,6 +177,7 @@ fn words(words: &str, x: f64, y: f64, size_mm: f64) -> Text {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use toposlam::{Fingerprint, place::Place};
 
     #[test]
     fn a_picture_holds_every_vertex_edge_and_way_and_its_words_are_escaped() {
@@ -163,5 +191,23 @@ mod tests {
         assert_eq!(picture.matches("<line").count(), truth.edges.len());
         assert_eq!(picture.matches("<circle").count(), 2 * truth.nodes.len() + 1);
         assert!(picture.contains("a &lt; b &amp; c"));
+    }
+
+    #[test]
+    fn vertices_in_one_spot_are_drawn_side_by_side_around_it() {
+        let vertex = |x_mm| Vertex { position: Point::new(x_mm, 0.0), radius_mm: 1.0, name: String::new() };
+        let points = spread(&[vertex(0.0), vertex(9000.0), vertex(10.0), vertex(20.0)]);
+        let xs_mm: Vec<f64> = points.iter().map(|point| point.x_mm).collect();
+        assert_eq!(xs_mm, [-SIDE_BY_SIDE_MM, 9000.0, 0.0, SIDE_BY_SIDE_MM]);
+    }
+
+    #[test]
+    fn a_vertex_is_drawn_at_the_node_it_was_mostly_taken_for() {
+        let fingerprint = Fingerprint::from_radius_mm(1000).unwrap();
+        let place = Place { fingerprint, frame_index: 0, degree: None, spread_mm: 0 };
+        let visit = |x_mm, node| Detection { place, position: Point::new(x_mm, 0.0), node };
+        let visits = [visit(100.0, Some(3)), visit(9000.0, Some(1)), visit(300.0, Some(3)), visit(5000.0, None)];
+        assert_eq!(mostly_at(&visits), Point::new(200.0, 0.0));
+        assert_eq!(mostly_at(&[]), Point::new(0.0, 0.0));
     }
 }

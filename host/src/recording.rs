@@ -4,7 +4,6 @@ use std::io::Read;
 
 use anyhow::{Context, bail, ensure};
 use serde::Deserialize;
-use toposlam::place::{Place, PlaceConfig, PlaceDetector};
 use toposlam::ring::{Echo, RingFrame, RingGeometry};
 use toposlam::{FaultCounters, FaultKind};
 
@@ -142,21 +141,6 @@ impl Ring {
             }
             _ => Echo::Dead,
         }
-    }
-
-    /// Runs the place detector over the frames of a recording; gives the places and the faults.
-    ///
-    /// # Errors
-    /// When the detector's settings do not suit the ring.
-    pub fn replay(
-        &self,
-        frames: &[RingFrame<SONARS_MAX>],
-        config: PlaceConfig,
-    ) -> anyhow::Result<(Vec<Place>, FaultCounters)> {
-        let mut detector = PlaceDetector::new();
-        detector.start(config, self.geometry())?;
-        let places = frames.iter().filter_map(|frame| detector.observe(frame)).collect();
-        Ok((places, *detector.faults()))
     }
 }
 

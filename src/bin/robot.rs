@@ -198,7 +198,8 @@ fn main() -> ! {
     }
 
     let mapper = MAPPER.take();
-    if mapper.start(&reference::MAPPER).is_err() {
+    if let Err(error) = mapper.start(&reference::MAPPER) {
+        defmt::error!("{}", error);
         panic!()
     }
     let queue = QUEUE.take();
@@ -223,7 +224,7 @@ fn main() -> ! {
             let mut faults = ring_faults;
             faults.add(&transmitter.faults);
             if let Some((_, update)) = mapper.observe(&frame, &faults, |message| transmitter.send(message)) {
-                defmt::info!("place {} is vertex {}", update.place_index, update.vertex);
+                defmt::info!("{}", update);
             }
             if loop_count.is_multiple_of(FRAMES_PER_HEALTH) {
                 // A message that finds no room is counted; the next one comes.

@@ -54,6 +54,15 @@ impl NgramLength {
 }
 
 /// A sequence of labels, packed into one word and equal to its reversal: the robot may pass it either way.
+///
+/// ```
+/// use toposlam::{Fingerprint, Ngram, NgramLength};
+///
+/// let [hall, office] = [Fingerprint::from_radius_mm(1200)?, Fingerprint::from_radius_mm(800)?];
+/// let length = NgramLength::new(2)?;
+/// assert_eq!(Ngram::new(length, &[hall, office])?, Ngram::new(length, &[office, hall])?);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct Ngram(u64);
 

@@ -7,6 +7,21 @@ use crate::{Fingerprint, History};
 ///
 /// The capacity is counted in words because the consistency measure holds one bit for each n-gram and each direction of
 /// travel in a state set of `WORDS` 32-bit words.
+///
+/// ```
+/// use toposlam::{Fingerprint, History, NgramLength, NgramTable};
+///
+/// // A corridor from 800 mm to 1200 mm to 1500 mm: the robot may have gone on or turned back anywhere.
+/// let mut history = History::<1>::new();
+/// let mut grams = NgramTable::<2>::new(NgramLength::new(3)?);
+/// for radius_mm in [800, 1200, 1500] {
+///     history.push(Fingerprint::from_radius_mm(radius_mm)?);
+///     grams.extend(&history)?;
+/// }
+/// // 800-1200-1500 and the U-turns 800-1200-800, 1200-800-1200, 1200-1500-1200, 1500-1200-1500.
+/// assert_eq!(grams.len(), 5);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Clone, Debug)]
 pub struct NgramTable<const WORDS: usize> {
     length: NgramLength,

@@ -13,6 +13,23 @@
 //! The radius is the mean, over the (at most eight) confirming frames with the smallest spread, of the mean range of
 //! the equidistant obstacles. While the robot comes nearer to the third obstacle it draws away from the first two, so
 //! their mean is nearly constant around the meet point, and averaging over frames costs little bias.
+//!
+//! ```
+//! use toposlam::place::{PlaceConfig, PlaceDetector};
+//! use toposlam::ring::{Echo, RingFrame, RingGeometry};
+//!
+//! let mut detector = PlaceDetector::<4>::new();
+//! detector.start(PlaceConfig { live_sensors_min: 4, ..PlaceConfig::DEFAULT }, RingGeometry::even())?;
+//! // Along a corridor 1.6 m wide to the wall at its end, and back; nothing to be heard behind.
+//! let mut places = Vec::new();
+//! for step in -50_i32..=50 {
+//!     let [ahead, beside] = [800 + 30 * step.unsigned_abs() as u16, 800].map(|range_mm| Echo::Range { range_mm });
+//!     places.extend(detector.observe(&RingFrame { echoes: [ahead, beside, Echo::Silence, beside] }));
+//! }
+//! assert_eq!(places.len(), 1);
+//! assert!((800..=820).contains(&places[0].fingerprint.radius_mm()));
+//! # Ok::<(), toposlam::place::PlaceConfigError>(())
+//! ```
 
 mod config;
 mod obstacles;

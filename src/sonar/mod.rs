@@ -24,7 +24,6 @@ pub trait SonarRing<const SONARS: usize> {
 
 /// What went wrong with one sensor of a ring.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct SonarError {
     /// The sensor's index in the frame.
     pub sensor: u8,
@@ -34,7 +33,6 @@ pub struct SonarError {
 
 /// How a sensor can fail to say anything about the world.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum SonarFault {
     /// It did not acknowledge its address, or was still ranging when the time was up.
     Silent,

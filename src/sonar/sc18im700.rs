@@ -257,7 +257,6 @@ impl<UART: Read<u8> + Write<u8>> I2c for Sc18im700<UART> {
 
 /// Why a message over the bridge failed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub enum BridgeError {
     /// No device acknowledged the address.

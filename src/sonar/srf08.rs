@@ -114,7 +114,6 @@ impl Default for Srf08Config {
 
 /// Which field of a [`Srf08Config`] cannot be.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub enum Srf08ConfigError {
     /// `first_address`: not every sensor of the ring gets an address from 0x70 to 0x7F.

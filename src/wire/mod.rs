@@ -8,6 +8,20 @@
 //! There is no back channel. Every message states a fact in absolute terms, so that hearing it twice does no harm, and
 //! the [`Reporter`] repeats the whole map in turn, so that a listener who joins late or loses frames converges; it
 //! learns that it has from a digest of the map. All of it is `no_std` and neither blocks nor allocates.
+//!
+//! ```
+//! use toposlam::wire::{Decoder, Encoder, MAX_FRAME_BYTES, Message, Picture, Progress};
+//!
+//! let mut buffer = [0; MAX_FRAME_BYTES];
+//! let bytes = Encoder::default().encode(&Message::Edge { a: 0, b: 1, present: true }, &mut buffer)?;
+//!
+//! let mut picture = Picture::<64>::new();
+//! if let Progress::Message { header, message, .. } = Decoder::new().feed(bytes) {
+//!     picture.apply(header, &message);
+//! }
+//! assert_eq!(picture.neighbours(0), 0b10);
+//! # Ok::<(), toposlam::wire::EncodeError>(())
+//! ```
 
 mod decoder;
 mod digest;

@@ -4,18 +4,10 @@ use std::{ops::ControlFlow, path::PathBuf, process::Command, sync::Mutex, time::
 
 use anyhow::{Context, bail, ensure};
 use clap::Args;
-use indicatif::{ProgressBar, ProgressStyle};
-use toposlam::{
-    FaultCounters, Update,
-    reference::{self, RobotMapper},
-    wire::{Decoder, Evidence, Location, Message, Picture, Progress, map_digest},
-};
-use toposlam_host::{
-    emulator::Emulation,
-    world::{RobotModel, Simulation},
-};
+use toposlam::wire::{Decoder, Evidence, Location, Message, Picture, Progress};
+use toposlam_host::emulator::Emulation;
 
-use super::simulate::{load_plan, noise_factor};
+use super::drive::{Drive, DriveArguments, progress_bar};
 
 /// Where `cargo firmware` puts the image.
 const IMAGE: &str = "thumbv7em-none-eabihf/release/robot";
@@ -23,18 +15,11 @@ const IMAGE: &str = "thumbv7em-none-eabihf/release/robot";
 /// Arguments of `toposlam emulate`.
 #[derive(Args)]
 pub(crate) struct Arguments {
-    /// Floor plan: ring, office, flat, or a file.
-    #[arg(long, default_value = "office")]
-    plan: String,
+    #[command(flatten)]
+    drive: DriveArguments,
     /// Drive until this many places were detected.
     #[arg(long, default_value_t = 30)]
     places: usize,
-    /// Seed of the drive and of every noise.
-    #[arg(long, default_value_t = 1)]
-    seed: u64,
-    /// Every noise of the robot, multiplied by this.
-    #[arg(long, default_value_t = 1.0, value_parser = noise_factor)]
-    noise: f64,
     /// The firmware image; built with `cargo firmware` when it is not given.
     #[arg(long)]
     elf: Option<PathBuf>,
@@ -46,10 +31,33 @@ pub(crate) struct Arguments {
     timeout_s: u64,
 }
 
-/// This computer's repetition of what the firmware does.
-struct Twin {
-    mapper: RobotMapper,
-    places: Vec<(u16, Update)>,
+/// What the firmware said.
+struct Heard {
+    decoder: Decoder,
+    picture: Picture<64>,
+    places: Vec<(u32, u16)>,
+}
+
+impl Heard {
+    /// Takes bytes of the line; calls `on_location` whenever the firmware says where the robot is.
+    fn feed(&mut self, bytes: &[u8], mut on_location: impl FnMut(Location) -> ControlFlow<()>) -> ControlFlow<()> {
+        let mut rest = bytes;
+        loop {
+            rest = match self.decoder.feed(rest) {
+                Progress::NeedsMore => return ControlFlow::Continue(()),
+                Progress::Error { rest, .. } => rest,
+                Progress::Message { header, message, rest } => {
+                    self.picture.apply(header, &message);
+                    match message {
+                        Message::Place { place_index, radius_mm, .. } => self.places.push((place_index, radius_mm)),
+                        Message::Location(location) => on_location(location)?,
+                        _ => {}
+                    }
+                    rest
+                }
+            };
+        }
+    }
 }
 
 pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
@@ -57,89 +65,83 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
         Some(elf) => elf.clone(),
         None => build_firmware()?,
     };
-    let plan = load_plan(&arguments.plan)?;
-    let model = RobotModel::default().with_noise(arguments.noise);
-    let mut simulation = Simulation::new(&plan, model, arguments.seed)?;
-
-    let mut twin = Twin { mapper: RobotMapper::new(), places: Vec::new() };
-    twin.mapper.start(&reference::MAPPER)?;
-    let twin = Mutex::new(twin);
-
-    let progress = ProgressBar::new(arguments.places as u64)
-        .with_style(ProgressStyle::with_template("{bar:40} {pos}/{len} places, {elapsed}")?);
-    let mut decoder = Decoder::new();
-    let mut picture = Picture::<64>::new();
-    let mut heard_places = Vec::new();
+    // The emulator asks for frames on one thread and hands on what it heard on another.
+    let drive = Mutex::new(Drive::start(&arguments.drive)?);
+    let progress = progress_bar(arguments.places)?;
+    let mut heard = Heard { decoder: Decoder::new(), picture: Picture::new(), places: Vec::new() };
+    let mut printed = 0;
+    let mut elsewhere = None;
 
     let mut emulation = Emulation::new(elf);
     emulation.qemu = arguments.qemu.clone();
     emulation.timeout = Duration::from_secs(arguments.timeout_s);
     let outcome = emulation.run(
         || {
-            let mut twin = twin.lock().ok()?;
-            if twin.places.len() >= arguments.places {
+            let mut drive = drive.lock().ok()?;
+            if drive.mapping().steps().len() >= arguments.places {
                 return None;
             }
-            let (frame, _) = simulation.next()?;
-            if let Some((place, update)) = twin.mapper.observe(&frame, &FaultCounters::new(), |_| Ok(())) {
-                twin.places.push((place.fingerprint.radius_mm(), update));
-            }
-            Some(frame)
+            drive.advance().map(|(frame, _)| frame)
         },
         |bytes| {
-            let mut rest = bytes;
-            loop {
-                rest = match decoder.feed(rest) {
-                    Progress::NeedsMore => return ControlFlow::Continue(()),
-                    Progress::Error { rest, .. } => rest,
-                    Progress::Message { header, message, rest } => {
-                        picture.apply(header, &message);
-                        if let Message::Place { place_index, radius_mm, .. } = message {
-                            heard_places.push((place_index, radius_mm));
-                            progress.set_position(u64::from(place_index) + 1);
-                        }
-                        rest
-                    }
-                };
-            }
+            heard.feed(bytes, |location| {
+                let Ok(drive) = drive.lock() else { return ControlFlow::Break(()) };
+                let steps = drive.mapping().steps();
+                let same = steps.get(location.place_index as usize).map(|step| Location::from(&step.update));
+                if same != Some(location) {
+                    elsewhere = Some(location);
+                    return ControlFlow::Break(());
+                }
+                // The location is repeated; a place is printed once.
+                for step in steps.iter().take(location.place_index as usize + 1).skip(printed) {
+                    progress.suspend(|| println!("{step}"));
+                    printed += 1;
+                }
+                progress.set_position(printed as u64);
+                ControlFlow::Continue(())
+            })
         },
     )?;
     progress.finish_and_clear();
+    if let Some(Location { place_index, vertex }) = elsewhere {
+        bail!("at place {place_index} the firmware believes to be at vertex {vertex}, and this computer does not");
+    }
 
-    let Ok(twin) = twin.into_inner() else { bail!("the repetition on this computer failed") };
-    let counters = decoder.counters();
-    let Some(health) = picture.health() else { bail!("the firmware never said how it is doing") };
-    println!(
-        "{}: {} places in {} frames, {:.1} s",
-        arguments.plan,
-        heard_places.len(),
-        outcome.frames,
-        outcome.seconds
-    );
-    println!("map: {} vertices, {} edges", picture.vertices(), picture.edges().count());
+    let Ok(drive) = drive.into_inner() else { bail!("the repetition on this computer failed") };
+    drive.summarise(&arguments.drive)?;
+    let counters = heard.decoder.counters();
+    let Some(health) = heard.picture.health() else { bail!("the firmware never said how it is doing") };
+    println!("firmware: {} places in {} frames, {:.1} s", heard.places.len(), outcome.frames, outcome.seconds);
     println!("wire: {} messages, {} frames lost, {} corrupt", counters.messages, counters.lost, counters.corrupt);
     println!("sensor bus: {} bytes, {} rounds of the loop", outcome.bus_bytes, health.loop_count);
     if let Some(bytes) = outcome.stack_high_water_bytes {
         println!("stack_high_water_bytes: {bytes}");
     }
+    compare(&drive, &heard)?;
+    println!("the firmware's map is this computer's, bit for bit");
+    Ok(())
+}
 
-    let expected_places: Vec<_> = (0..).zip(twin.places.iter().map(|(radius_mm, _)| *radius_mm)).collect();
-    ensure!(heard_places == expected_places, "the firmware detected other places than this computer");
-    ensure!(picture.is_converged(), "the map heard over the wire is not complete");
-    let same_map = (0..twin.mapper.map().vertices()).all(|vertex| {
-        picture.row(vertex).is_some_and(|row| {
-            let map = twin.mapper.map();
+/// Holds what the firmware said to this computer's repetition. The digest is part of a converged picture.
+fn compare(drive: &Drive, heard: &Heard) -> anyhow::Result<()> {
+    let (steps, map) = (drive.mapping().steps(), drive.mapping().map());
+    let places = steps.iter().map(|step| (step.update.place_index, step.place.fingerprint.radius_mm()));
+    ensure!(places.eq(heard.places.iter().copied()), "the firmware detected other places than this computer");
+    ensure!(heard.picture.is_converged(), "the map heard over the wire is not complete");
+    let same_rows = (0..map.vertices()).all(|vertex| {
+        heard.picture.row(vertex).is_some_and(|row| {
             map.label(vertex).map(|label| label.radius_mm()) == Some(row.radius_mm)
                 && map.visits(vertex) == row.visits
                 && map.neighbours(vertex) == row.neighbours
         })
     });
-    ensure!(same_map && picture.vertices() == twin.mapper.map().vertices(), "the firmware's map is another one");
-    if let Some((_, update)) = twin.places.last() {
-        ensure!(picture.location() == Some(Location::from(update)), "the firmware believes to be elsewhere");
-        ensure!(picture.evidence() == Some(Evidence::from(update)), "the firmware gives other evidence");
+    ensure!(same_rows && heard.picture.vertices() == map.vertices(), "the firmware's map is another one");
+    if let Some(step) = steps.last() {
+        let same_location = heard.picture.location() == Some(Location::from(&step.update));
+        ensure!(same_location, "the firmware believes to be elsewhere");
+        let same_evidence = heard.picture.evidence() == Some(Evidence::from(&step.update));
+        ensure!(same_evidence, "the firmware gives other evidence");
     }
-    println!("the firmware's map is this computer's, bit for bit (digest {:08x})", map_digest(twin.mapper.map()));
     Ok(())
 }
 

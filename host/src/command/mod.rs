@@ -1,5 +1,6 @@
-//! The subcommands, a file each: its arguments and what it does with them.
+//! The subcommands, a file each: its arguments and what it does with them. `drive` is what two of them share.
 
+mod drive;
 pub(crate) mod emulate;
 pub(crate) mod evaluate;
 pub(crate) mod replay;

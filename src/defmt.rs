@@ -1,0 +1,194 @@
+//! `defmt::Format` for the types that a firmware logs (feature `defmt`).
+//!
+//! Written out in this one file, so that no other one mentions the integration. A log line holds a number for each text.
+
+use defmt::{Format, Formatter, write};
+
+use crate::place::{Place, PlaceConfigError};
+use crate::ring::Echo;
+use crate::sonar::{BridgeError, SonarError, SonarFault, Srf08ConfigError};
+use crate::{
+    ConfigError, FaultCounters, FaultKind, Fingerprint, FingerprintError, NgramError, NgramsFull, Update, VerticesFull,
+    WeightFactors,
+};
+
+/// A text for each variant of an enum without fields.
+macro_rules! texts {
+    ($enum:ty { $($variant:ident => $text:literal,)* }) => {
+        impl Format for $enum {
+            fn format(&self, f: Formatter<'_>) {
+                match self { $(Self::$variant => write!(f, $text),)* }
+            }
+        }
+    };
+}
+
+texts!(FaultKind {
+    SonarSilent => "SonarSilent",
+    SonarNonsense => "SonarNonsense",
+    BusError => "BusError",
+    RingBlind => "RingBlind",
+    RadiusOutOfRange => "RadiusOutOfRange",
+    VerticesFull => "VerticesFull",
+    NgramsFull => "NgramsFull",
+    HistoryFull => "HistoryFull",
+    WireFull => "WireFull",
+    WireCorrupt => "WireCorrupt",
+});
+
+texts!(PlaceConfigError {
+    EquidistanceMm => "equidistance_mm is out of its range",
+    LeaveMm => "leave_mm is out of its range",
+    SeparationMrad => "separation_mrad is out of its range",
+    ConfirmFrames => "confirm_frames is out of its range",
+    LeaveFrames => "leave_frames is out of its range",
+    SettleFrames => "settle_frames is out of its range",
+    RangeMinMm => "range_min_mm is out of its range",
+    RangeMaxMm => "range_max_mm is out of its range",
+    LiveSensorsMin => "live_sensors_min is out of its range",
+    Bearing => "bearings_mrad is out of its range",
+});
+
+texts!(SonarFault {
+    Silent => "did not answer in time",
+    Nonsense => "answered with an impossible range",
+    Bus => "could not be reached: bus error",
+});
+
+texts!(BridgeError {
+    AddressNotAcknowledged => "no device acknowledged the address",
+    DataNotAcknowledged => "the device refused a byte",
+    BusTimeout => "the bus was stuck",
+    Silent => "the bridge does not answer",
+    Line => "the line to the bridge had an error",
+    OutOfStep => "the bridge's reply makes no sense",
+    TooLong => "more than 16 bytes in one direction",
+    BaudRate => "no divider for this line speed",
+});
+
+texts!(Srf08ConfigError {
+    FirstAddress => "first_address is out of its range",
+    FiringGroups => "firing_groups is out of its range",
+    Timeout => "timeout_ms is out of its range",
+    PollInterval => "poll_interval_us is out of its range",
+    SpeedOfSound => "speed_of_sound_m_per_s is out of its range",
+    Range => "min_range_mm is above max_range_mm",
+});
+
+impl Format for Fingerprint {
+    fn format(&self, f: Formatter<'_>) {
+        write!(f, "{=u16} mm", self.radius_mm());
+    }
+}
+
+impl Format for FingerprintError {
+    fn format(&self, f: Formatter<'_>) {
+        match self {
+            Self::TooLarge { radius_mm } => write!(f, "radius of {=u16} mm is beyond 8188 mm", radius_mm),
+        }
+    }
+}
+
+impl Format for Echo {
+    fn format(&self, f: Formatter<'_>) {
+        match self {
+            Self::Range { range_mm } => write!(f, "{=u16} mm", range_mm),
+            Self::Silence => write!(f, "silence"),
+            Self::Dead => write!(f, "dead"),
+        }
+    }
+}
+
+impl Format for Place {
+    fn format(&self, f: Formatter<'_>) {
+        let Self { fingerprint, frame_index, degree, spread_mm } = self;
+        write!(f, "place of {} in frame {=u32}, degree {}", fingerprint, frame_index, degree);
+        write!(f, ", spread {=u16} mm", spread_mm);
+    }
+}
+
+impl Format for Update {
+    fn format(&self, f: Formatter<'_>) {
+        let Self { place_index, vertex, is_new, consistency_mm, factors, lead_q16, distinct } = self;
+        write!(f, "place {=u32} is vertex {=u8} (new: {=bool})", place_index, vertex, is_new);
+        write!(f, ", consistency {=u16} mm, {}", consistency_mm, factors);
+        write!(f, ", lead {=i32} / 65536 nats, {=u8} hypotheses", lead_q16, distinct);
+    }
+}
+
+impl Format for WeightFactors {
+    fn format(&self, f: Formatter<'_>) {
+        let Self { ln_label_q16, ln_consistency_q16, ln_size_q16 } = self;
+        write!(f, "label {=i32}, consistency {=i32}", ln_label_q16, ln_consistency_q16);
+        write!(f, ", size {=i32} / 65536 nats", ln_size_q16);
+    }
+}
+
+impl Format for FaultCounters {
+    fn format(&self, f: Formatter<'_>) {
+        for kind in FaultKind::ALL.into_iter().filter(|kind| self.of(*kind) > 0) {
+            write!(f, "{} {=u32} ", kind, self.of(kind));
+        }
+    }
+}
+
+impl Format for SonarError {
+    fn format(&self, f: Formatter<'_>) {
+        write!(f, "sonar {=u8} {}", self.sensor, self.fault);
+    }
+}
+
+impl Format for ConfigError {
+    fn format(&self, f: Formatter<'_>) {
+        write!(f, "{=str} is out of its range", self.0);
+    }
+}
+
+impl Format for NgramError {
+    fn format(&self, f: Formatter<'_>) {
+        match self {
+            Self::Length { labels } => write!(f, "an n-gram has 2 to 7 labels, not {=u8}", labels),
+            Self::Labels => write!(f, "the number of labels is not the length of the n-gram"),
+        }
+    }
+}
+
+impl Format for NgramsFull {
+    fn format(&self, f: Formatter<'_>) {
+        write!(f, "the n-gram table has no room for another n-gram");
+    }
+}
+
+impl Format for VerticesFull {
+    fn format(&self, f: Formatter<'_>) {
+        write!(f, "the map has no room for another vertex");
+    }
+}
+
+/// What only a firmware with the serial protocol logs.
+#[cfg(feature = "wire")]
+mod wire {
+    use super::{Format, Formatter, write};
+    use crate::MapperError;
+    use crate::wire::{EncodeError, QueueFull};
+
+    texts!(EncodeError {
+        OutputTooShort => "the output buffer is shorter than the frame",
+        MessageTooLong => "the message is longer than a frame can be",
+    });
+
+    impl Format for QueueFull {
+        fn format(&self, f: Formatter<'_>) {
+            write!(f, "the transmit queue has no room for the message");
+        }
+    }
+
+    impl Format for MapperError {
+        fn format(&self, f: Formatter<'_>) {
+            match self {
+                Self::Place(error) => error.format(f),
+                Self::Filter(error) => error.format(f),
+            }
+        }
+    }
+}
