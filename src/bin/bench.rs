@@ -109,15 +109,19 @@ const DIRECTIONS: [(&str, Direction); 3] = [
     ("history_to_map_instructions_per_place", Direction::HistoryToMap),
 ];
 
-/// The measurements of one kind.
-struct Costs {
-    values: [u64; DIRECTIONS.len() * PLACES_MM.len()],
+/// The measurements of one kind, in the order in which they were made.
+struct Costs<const LENGTH: usize> {
+    values: [u64; LENGTH],
     held: usize,
 }
 
-impl Costs {
+/// One for each place in each direction.
+type PlaceCosts = Costs<{ DIRECTIONS.len() * PLACES_MM.len() }>;
+type FrameCosts = Costs<{ FRAMES_MM.len() }>;
+
+impl<const LENGTH: usize> Costs<LENGTH> {
     const fn new() -> Self {
-        Self { values: [0; DIRECTIONS.len() * PLACES_MM.len()], held: 0 }
+        Self { values: [0; LENGTH], held: 0 }
     }
 
     fn push(&mut self, value: u64) {
@@ -126,16 +130,14 @@ impl Costs {
             self.held += 1;
         }
     }
+}
 
-    /// Takes all measurements out: median, 90th percentile and largest.
-    fn take_quantiles(&mut self) -> [u64; 3] {
-        let values = self.values.get_mut(..self.held).unwrap_or(&mut []);
-        values.sort_unstable();
-        self.held = 0;
-        [50, 90, 100].map(|percent| {
-            let rank = (values.len() * percent / 100).min(values.len().saturating_sub(1));
-            values.get(rank).copied().unwrap_or(0)
-        })
+/// Prints median, 90th percentile and largest of some measurements.
+fn print_quantiles(name: &str, values: &mut [u64]) {
+    values.sort_unstable();
+    for (quantile, percent) in [("median", 50), ("p90", 90), ("worst", 100)] {
+        let rank = (values.len() * percent / 100).min(values.len().saturating_sub(1));
+        hprintln!("{}_{}: {}", name, quantile, values.get(rank).copied().unwrap_or(0));
     }
 }
 
@@ -145,15 +147,16 @@ struct Bench {
     filter: &'static mut Filter,
     detector: &'static mut Detector,
     reporter: &'static mut Reporter<VERTICES>,
-    filter_costs: &'static mut Costs,
-    report_costs: &'static mut Costs,
+    filter_costs: &'static mut PlaceCosts,
+    report_costs: &'static mut PlaceCosts,
+    detector_costs: &'static mut FrameCosts,
     largest_report_bytes: usize,
 }
 
 impl Bench {
-    /// One recorded place after the other through the filter, and what it found on to the wire. Returns what a place
-    /// costs the filter with one direction of Eq. 2.
-    fn filter(&mut self, direction: Direction) -> [u64; 3] {
+    /// One recorded place after the other through the filter with one direction of Eq. 2, and what it found on to the
+    /// wire.
+    fn filter(&mut self, direction: Direction) {
         let Ok(()) = self.filter.start(Config { direction, ..reference::FILTER }, reference::SEED) else { panic!() };
         self.reporter.start(Hello::new(0, reference::SEED, CAPACITIES), u16::MAX);
         let mut encoder = Encoder::new(0);
@@ -174,11 +177,10 @@ impl Bench {
             self.report_costs.push(instructions);
             self.largest_report_bytes = self.largest_report_bytes.max(bytes);
         }
-        self.filter_costs.take_quantiles()
     }
 
-    /// Recorded frames through the place detector. Returns what a frame costs, and how many places there were.
-    fn detector(&mut self) -> ([u64; 3], usize) {
+    /// Recorded frames through the place detector. Returns how many places there were.
+    fn detector(&mut self) -> usize {
         let Ok(()) = self.detector.start(reference::PLACE, reference::RING) else { panic!() };
         let mut places = 0;
         for ranges_mm in &FRAMES_MM {
@@ -186,16 +188,10 @@ impl Bench {
             let frame = RingFrame { echoes: ranges_mm.map(echo) };
             let (instructions, place) = self.clock.measure(|| self.detector.observe(black_box(&frame)));
             places += usize::from(place.is_some());
-            self.filter_costs.push(instructions);
+            self.detector_costs.push(instructions);
         }
-        (self.filter_costs.take_quantiles(), places)
+        places
     }
-}
-
-fn print_quantiles(name: &str, [median, p90, worst]: [u64; 3]) {
-    hprintln!("{}_median: {}", name, median);
-    hprintln!("{}_p90: {}", name, p90);
-    hprintln!("{}_worst: {}", name, worst);
 }
 
 #[cortex_m_rt::entry]
@@ -203,8 +199,9 @@ fn main() -> ! {
     static FILTER: ConstStaticCell<Filter> = ConstStaticCell::new(Filter::new());
     static DETECTOR: ConstStaticCell<Detector> = ConstStaticCell::new(Detector::new());
     static REPORTER: ConstStaticCell<Reporter<VERTICES>> = ConstStaticCell::new(Reporter::new());
-    static FILTER_COSTS: ConstStaticCell<Costs> = ConstStaticCell::new(Costs::new());
-    static REPORT_COSTS: ConstStaticCell<Costs> = ConstStaticCell::new(Costs::new());
+    static FILTER_COSTS: ConstStaticCell<PlaceCosts> = ConstStaticCell::new(Costs::new());
+    static REPORT_COSTS: ConstStaticCell<PlaceCosts> = ConstStaticCell::new(Costs::new());
+    static DETECTOR_COSTS: ConstStaticCell<FrameCosts> = ConstStaticCell::new(Costs::new());
 
     let Some(core) = cortex_m::Peripherals::take() else { panic!() };
     let mut bench = Bench {
@@ -214,24 +211,26 @@ fn main() -> ! {
         reporter: REPORTER.take(),
         filter_costs: FILTER_COSTS.take(),
         report_costs: REPORT_COSTS.take(),
+        detector_costs: DETECTOR_COSTS.take(),
         largest_report_bytes: 0,
     };
-    let (detector, places_detected) = bench.detector();
-    let filter = DIRECTIONS.map(|(name, direction)| (name, bench.filter(direction)));
-    let report = bench.report_costs.take_quantiles();
-    // Before formatting, which is not part of the job, adds to it.
+    let places_detected = bench.detector();
+    for (_, direction) in DIRECTIONS {
+        bench.filter(direction);
+    }
+    // Before sorting and formatting, which are no part of the job, add to it.
     let stack_bytes = support::stack_high_water_bytes();
 
     hprintln!("places: {}", PLACES_MM.len());
     hprintln!("history_places: {}", History::<HISTORY_WORDS>::CAPACITY);
-    for (name, quantiles) in filter {
-        print_quantiles(name, quantiles);
+    for ((name, _), costs) in DIRECTIONS.iter().zip(bench.filter_costs.values.chunks_mut(PLACES_MM.len())) {
+        print_quantiles(name, costs);
     }
-    print_quantiles("report_instructions_per_place", report);
+    print_quantiles("report_instructions_per_place", &mut bench.report_costs.values);
     hprintln!("report_bytes_per_place_worst: {}", bench.largest_report_bytes);
     hprintln!("frames: {}", FRAMES_MM.len());
     hprintln!("frames_places_detected: {}", places_detected);
-    print_quantiles("detector_instructions_per_frame", detector);
+    print_quantiles("detector_instructions_per_frame", &mut bench.detector_costs.values);
     hprintln!("ticks_per_million_instructions: {}", bench.clock.ticks_of_two_million / 2);
     hprintln!("filter_bytes: {}", size_of::<Filter>());
     hprintln!("mapper_bytes: {}", size_of::<RobotMapper>());
