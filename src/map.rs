@@ -22,6 +22,11 @@ impl Label {
         Fingerprint::from_steps(mean as u16).unwrap_or(Fingerprint::MAX)
     }
 
+    fn including(mut self, fingerprint: Fingerprint) -> Self {
+        self.include(fingerprint);
+        self
+    }
+
     fn include(&mut self, fingerprint: Fingerprint) {
         if self.visits >= Self::FULL {
             self.visits /= 2;
@@ -114,6 +119,14 @@ impl<const V: usize> Map<V> {
             label.include(fingerprint);
             *mean = label.mean();
         }
+    }
+
+    /// What the label of a vertex would be with one more fingerprint; that of a new vertex is the fingerprint.
+    pub(crate) fn label_with(&self, vertex: u8, fingerprint: Fingerprint) -> Fingerprint {
+        if vertex >= self.vertices {
+            return fingerprint;
+        }
+        self.labels.get(usize::from(vertex)).map_or(fingerprint, |label| label.including(fingerprint).mean())
     }
 
     /// Joins two vertices by an edge; nothing happens when there is one or when the map lacks one of them.

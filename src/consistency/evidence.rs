@@ -31,6 +31,10 @@ pub trait Readable<const WORDS: usize> {
     /// The states at which the straight readings of the whole set end.
     fn ends(&self, straight_labels: u8) -> StateSet<WORDS>;
 
+    /// Label number `index` of the straight reading that ends at a state, in the n-gram's steps; `None` when no straight
+    /// reading ends there.
+    fn straight_label(&self, length: NgramLength, end: usize, index: u8) -> Option<u16>;
+
     /// Whether two readings from either end make one n-gram: they share their last label when `n` is odd, and are one
     /// step apart when it is even.
     fn meets(&self, length: NgramLength, first: &StateSet<WORDS>, second: &StateSet<WORDS>) -> bool;
@@ -84,6 +88,14 @@ impl<const WORDS: usize> Readable<WORDS> for History<WORDS> {
         ends
     }
 
+    fn straight_label(&self, length: NgramLength, end: usize, index: u8) -> Option<u16> {
+        let labels = usize::from(self.straight_labels(length));
+        let end_age = (self.newest_slot() + Self::CAPACITY).checked_sub(end)? % Self::CAPACITY;
+        let start_age = end_age + labels.checked_sub(1)?;
+        let label = self.newest(start_age).and(self.newest(start_age.checked_sub(usize::from(index))?))?;
+        Some(label.steps() >> length.coarsening())
+    }
+
     fn meets(&self, length: NgramLength, first: &StateSet<WORDS>, second: &StateSet<WORDS>) -> bool {
         if length.get() % 2 == 1 { first.intersects(second) } else { self.around(first).intersects(second) }
     }
@@ -123,6 +135,10 @@ impl<const WORDS: usize> Readable<WORDS> for NgramTable<WORDS> {
             left = left.saturating_sub(32);
             word
         }))
+    }
+
+    fn straight_label(&self, length: NgramLength, end: usize, index: u8) -> Option<u16> {
+        self.ngrams().get(end).map(|ngram| ngram.label(length, index))
     }
 
     fn meets(&self, _: NgramLength, first: &StateSet<WORDS>, second: &StateSet<WORDS>) -> bool {

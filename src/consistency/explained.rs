@@ -19,6 +19,9 @@ impl<const V: usize, const WORDS: usize, const INDICES: usize> Consistency<V, WO
         if labels == 0 {
             return true;
         }
+        if self.witnesses.refute_ngrams(map, evidence, length, distance) {
+            return false;
+        }
         let [reached, next] = &mut self.reached;
         for (set, vertex) in reached.iter_mut().zip(0..map.vertices()) {
             *set = *self.readings.at(evidence, length, (vertex, map.label_of(vertex)), 0, distance);
@@ -43,6 +46,10 @@ impl<const V: usize, const WORDS: usize, const INDICES: usize> Consistency<V, WO
         for set in reached.iter().take(usize::from(map.vertices())) {
             explained.insert_all(set);
         }
-        explained.contains_all(&evidence.ends(labels))
+        let missing = explained.first_missing(&evidence.ends(labels));
+        if let Some(end) = missing {
+            self.witnesses.remember_end(end as u16);
+        }
+        missing.is_none()
     }
 }

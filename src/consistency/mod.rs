@@ -10,12 +10,14 @@ mod evidence;
 mod explained;
 mod readings;
 mod state_set;
+mod witness;
 
 pub use evidence::Evidence;
 
 use crate::{Map, NgramLength};
 use readings::Readings;
 use state_set::StateSet;
+use witness::Witnesses;
 
 /// Which half of Eq. 2 is taken.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -38,14 +40,18 @@ pub struct Consistency<const V: usize, const WORDS: usize, const INDICES: usize>
     /// Where straight readings of the evidence have got to at each vertex; two rows, used in turn.
     reached: [[StateSet<WORDS>; V]; 2],
     arms: confirmed::Arms<V, WORDS>,
-    /// The vertex whose walks were refuted last: the first to ask the next time.
-    suspect: u8,
+    witnesses: Witnesses,
 }
 
 impl<const V: usize, const WORDS: usize, const INDICES: usize> Consistency<V, WORDS, INDICES> {
     /// Scratch memory that holds nothing yet.
     pub const fn new() -> Self {
-        Self { readings: Readings::new(), reached: [[StateSet::EMPTY; V]; 2], arms: confirmed::Arms::new(), suspect: 0 }
+        Self {
+            readings: Readings::new(),
+            reached: [[StateSet::EMPTY; V]; 2],
+            arms: confirmed::Arms::new(),
+            witnesses: Witnesses::new(),
+        }
     }
 
     /// The distance of Eq. 2, or one directed half of it, in units of [`NgramLength::label_step_mm`].
@@ -61,49 +67,40 @@ impl<const V: usize, const WORDS: usize, const INDICES: usize> Consistency<V, WO
     ) -> Option<u16> {
         self.readings.forget();
         let largest = crate::Fingerprint::MAX.steps() >> length.coarsening();
-        self.search(map, evidence, length, direction, 0, largest)
+        self.search(map, evidence, length, direction, (0, largest))
     }
 
-    /// The distance, if it is not above a limit. The hint is a guess, near which the search starts. Readings are kept
-    /// from call to call, so the evidence must be the same, or [`Consistency::forget`] be called between.
+    /// The distance, if it is not above a limit; it is known to be no smaller than `known`, and the search starts there.
+    /// Readings are kept from call to call, so the evidence must be the same, or [`Consistency::forget`] be called
+    /// between.
     pub(crate) fn search(
         &mut self,
         map: &Map<V>,
         evidence: &impl Evidence<WORDS>,
         length: NgramLength,
         direction: Direction,
-        hint: u16,
-        limit: u16,
+        (known, limit): (u16, u16),
     ) -> Option<u16> {
         let mut holds = |distance: u16| self.holds(map, evidence, length, direction, distance);
-        let (mut refuted, mut held);
-        let mut stride = 1;
-        let guess = hint.min(limit);
-        if holds(guess) {
-            held = guess;
-            loop {
-                let Some(below) = held.checked_sub(1) else { return Some(held) };
-                refuted = below.saturating_sub(stride - 1);
-                if !holds(refuted) {
-                    break;
-                }
-                held = refuted;
-                stride *= 2;
-            }
-        } else {
-            refuted = guess;
-            loop {
-                if refuted >= limit {
-                    return None;
-                }
-                held = refuted.saturating_add(stride).min(limit);
-                if holds(held) {
-                    break;
-                }
-                refuted = held;
-                stride *= 2;
-            }
+        if known > limit {
+            return None;
         }
+        if holds(known) {
+            return Some(known);
+        }
+        let mut refuted = known;
+        let mut stride = 1;
+        let mut held = loop {
+            if refuted >= limit {
+                return None;
+            }
+            let farther = refuted.saturating_add(stride).min(limit);
+            if holds(farther) {
+                break farther;
+            }
+            refuted = farther;
+            stride *= 2;
+        };
         while held - refuted > 1 {
             let middle = refuted + (held - refuted) / 2;
             if holds(middle) { held = middle } else { refuted = middle }

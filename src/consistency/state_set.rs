@@ -23,6 +23,16 @@ impl<const WORDS: usize> StateSet<WORDS> {
         }
     }
 
+    pub(super) fn is_empty(&self) -> bool {
+        self.0.iter().all(|&word| word == 0)
+    }
+
+    /// The first state that another set has and this one lacks.
+    pub(super) fn first_missing(&self, wanted: &Self) -> Option<usize> {
+        let mut missing = self.0.iter().zip(wanted.0).map(|(word, wanted)| wanted & !word).enumerate();
+        missing.find(|&(_, word)| word != 0).map(|(index, word)| 32 * index + word.trailing_zeros() as usize)
+    }
+
     pub(super) fn contains(&self, state: usize) -> bool {
         self.0.get(state / 32).is_some_and(|word| word >> (state % 32) & 1 == 1)
     }
@@ -46,25 +56,6 @@ impl<const WORDS: usize> StateSet<WORDS> {
 
     pub(super) fn contains_all(&self, other: &Self) -> bool {
         self.0.iter().zip(other.0).all(|(word, wanted)| wanted & !word == 0)
-    }
-
-    /// Adds this set to a list of minimal sets, unless one of them lies within it; those that it lies within leave.
-    /// The number of sets in the list is returned, or `None` when there is no room, with nothing changed.
-    pub(super) fn insert_minimal(&self, sets: &mut [Self], held: usize) -> Option<usize> {
-        if sets.iter().take(held).any(|set| self.contains_all(set)) {
-            return Some(held);
-        }
-        let mut kept = 0;
-        for index in 0..held {
-            if !sets.get(index)?.contains_all(self) {
-                if kept < index {
-                    *sets.get_mut(kept)? = *sets.get(index)?;
-                }
-                kept += 1;
-            }
-        }
-        *sets.get_mut(kept)? = *self;
-        Some(kept + 1)
     }
 
     /// Every state moved to the next number; the last one becomes the first.
@@ -115,17 +106,5 @@ mod tests {
         assert_eq!(set(&[0, 32]).rotated_both_ways(), set(&[63, 1, 31, 33]));
         assert_eq!(set(&[63]).rotated_both_ways(), set(&[62, 0]));
         assert_eq!(set(&[1, 33]).halves_swapped(), set(&[33, 1]));
-    }
-
-    #[test]
-    fn only_minimal_sets_are_held() {
-        let mut sets = [StateSet::EMPTY; 2];
-        let mut held = set(&[1, 2, 3]).insert_minimal(&mut sets, 0).unwrap();
-        held = set(&[4, 5]).insert_minimal(&mut sets, held).unwrap();
-        assert_eq!(set(&[1, 2]).insert_minimal(&mut sets, held), Some(2), "replaces the first");
-        assert_eq!(set(&[4, 5, 6]).insert_minimal(&mut sets, held), Some(2), "holds the second");
-        assert!(sets.contains(&set(&[1, 2])) && sets.contains(&set(&[4, 5])));
-        assert_eq!(set(&[7]).insert_minimal(&mut sets, held), None, "no room");
-        assert_eq!(set(&[]).insert_minimal(&mut sets, held), Some(1), "the empty set lies within all");
     }
 }

@@ -4,6 +4,7 @@ mod config;
 mod particles;
 mod prior;
 mod resample;
+mod selection;
 
 pub use config::{Config, ConfigError};
 pub use particles::{Particle, WeightFactors};
@@ -27,8 +28,9 @@ pub struct Update {
     pub consistency_mm: u16,
     /// The three factors of the weight.
     pub factors: WeightFactors,
-    /// By how much the weight leads that of the best other candidate, as a logarithm in units of 2⁻¹⁶ nats; 15 nats or
-    /// more are reported as 15.
+    /// By how much the weight leads that of every other prediction, at least, as a logarithm in units of 2⁻¹⁶ nats:
+    /// predictions that were never proposed count with a bound on their weight. Negative when a heavier one was not
+    /// drawn; 15 nats or more are reported as 15.
     pub lead_q16: i32,
     /// How many different particles survived.
     pub distinct: u8,
@@ -97,56 +99,52 @@ impl<const N: usize, const V: usize, const WORDS: usize> PaperFilter<N, V, WORDS
 
     /// Takes the next place on line: Γ_env is what the filter's own history holds, this observation included.
     ///
-    /// Cost: bounded by (particles) · (V + 1) evaluations of Eq. 2; most are spared because a bound on the weight shows
-    /// that they cannot be drawn.
+    /// Cost: (particles) · (V + 1) predictions, of which some particles' worth need the distance of Eq. 2; at most all.
     pub fn observe(&mut self, fingerprint: Fingerprint) -> Update {
-        let draws = self.draws();
-        self.observe_with_draws(fingerprint, &draws)
+        let random = self.random();
+        self.observe_with_draws(fingerprint, random)
     }
 
-    /// Takes the next place with Γ_env from an earlier exploration, as the paper assumes.
+    /// Takes the next place with Γ_env from an earlier exploration, as the paper assumes. The length of its n-grams is
+    /// that of the prior.
     pub fn observe_with_prior<const PRIOR_WORDS: usize>(
         &mut self,
         fingerprint: Fingerprint,
         prior: &mut Prior<V, PRIOR_WORDS>,
     ) -> Update {
-        let draws = self.draws();
-        self.observe_with_prior_and_draws(fingerprint, prior, &draws)
+        let random = self.random();
+        self.observe_with_prior_and_draws(fingerprint, prior, random)
     }
 
-    /// As [`PaperFilter::observe`], with the random draws of the resampling given: the first `particles` of them count.
-    pub fn observe_with_draws(&mut self, fingerprint: Fingerprint, draws: &[u32; N]) -> Update {
+    /// As [`PaperFilter::observe`], with the random draws given: for each particle in turn, one that proposes a
+    /// prediction and one that accepts or rejects it, until one is accepted.
+    pub fn observe_with_draws(&mut self, fingerprint: Fingerprint, random: impl FnMut() -> u32) -> Update {
         self.remember(fingerprint);
-        let step = self.particles.step(
-            self.length(),
-            self.config.direction,
-            fingerprint,
-            draws,
-            (&self.history, &mut self.consistency),
-        );
+        let evidence = (&self.history, &mut self.consistency);
+        let length = NgramLength::new(self.config.ngram_length).unwrap_or(NgramLength::MIN);
+        let step = self.particles.step(length, self.config.direction, fingerprint, random, evidence);
         self.finish(step)
     }
 
-    /// As [`PaperFilter::observe_with_prior`], with the random draws of the resampling given: the first `particles` of
-    /// them count.
+    /// As [`PaperFilter::observe_with_prior`], with the random draws given as in [`PaperFilter::observe_with_draws`].
     pub fn observe_with_prior_and_draws<const PRIOR_WORDS: usize>(
         &mut self,
         fingerprint: Fingerprint,
         prior: &mut Prior<V, PRIOR_WORDS>,
-        draws: &[u32; N],
+        random: impl FnMut() -> u32,
     ) -> Update {
         self.remember(fingerprint);
-        let step =
-            self.particles.step(prior.ngrams().length(), self.config.direction, fingerprint, draws, prior.split());
+        let length = prior.ngrams().length();
+        let step = self.particles.step(length, self.config.direction, fingerprint, random, prior.split());
         self.finish(step)
     }
 
     /// The random draws for the next place: a function of the seed and the number of the place alone, so that a filter
     /// that is restored goes on as it would have.
-    fn draws(&self) -> [u32; N] {
+    fn random(&self) -> impl FnMut() -> u32 + use<N, V, WORDS> {
         let place_seed = self.seed.wrapping_add(u64::from(self.observed).wrapping_mul(0x9E37_79B9_7F4A_7C15));
         let mut random = Xoshiro128PlusPlus::seed_from_u64(place_seed);
-        core::array::from_fn(|_| random.next_u32())
+        move || random.next_u32()
     }
 
     fn length(&self) -> NgramLength {

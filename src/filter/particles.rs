@@ -1,7 +1,8 @@
-//! The particles: predict every vertex the robot may be at, weigh the predictions, draw the next particles (Section III.A).
+//! The particles and how one generation follows another (Section III.A).
 
 use super::Config;
-use super::resample::{REACH, relative_weight, target};
+use super::resample::PROPOSAL_REACH;
+use super::selection::{Choice, Selection};
 use crate::consistency::{Consistency, Direction, Evidence};
 use crate::likelihood::Likelihood;
 use crate::{Fingerprint, Map, NgramLength};
@@ -48,16 +49,27 @@ impl<const V: usize> Particle<V> {
         Self { map: Map::new(), place: 0, multiplicity: 0, parent: 0, consistency_mm: 0, factors: WeightFactors::ONE };
 }
 
-/// A prediction in the pool: its weight, and the distance of Eq. 2 in millimetres.
+/// A prediction in the pool.
 #[derive(Clone, Copy, Debug)]
-struct Candidate {
-    ln_weight: i32,
-    consistency_mm: u16,
+pub(super) struct Candidate {
+    /// ln of Eq. 7 · Eq. 9, how often it is proposed.
+    pub(super) ln_proposal: i32,
+    pub(super) distance: Distance,
+}
+
+/// What is known of the distance of Eq. 2 of a prediction.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Distance {
+    /// Only that no prediction is nearer to the evidence than the nearest.
+    Unknown,
+    /// The distance in millimetres; `u16::MAX` when it is infinite.
+    Known(u16),
+    /// So large that the prediction is never accepted.
+    TooLarge,
 }
 
 impl Candidate {
-    const NONE: Self = Self { ln_weight: 0, consistency_mm: 0 };
-    const IMPOSSIBLE: Self = Self { ln_weight: i32::MIN, consistency_mm: u16::MAX };
+    const UNSET: Self = Self { ln_proposal: 0, distance: Distance::Unknown };
 }
 
 /// What a step tells besides the particles.
@@ -89,7 +101,7 @@ impl<const N: usize, const V: usize> Particles<N, V> {
             distinct: 0,
             best: 0,
             wanted: 0,
-            pool: [[Candidate::NONE; V]; N],
+            pool: [[Candidate::UNSET; V]; N],
             predicted: Map::new(),
             likelihood: Likelihood::new(),
         }
@@ -115,157 +127,97 @@ impl<const N: usize, const V: usize> Particles<N, V> {
         self.all().get(usize::from(self.best)).unwrap_or(const { &Particle::NONE })
     }
 
-    /// Takes one observation: predicts, weighs and draws.
+    /// Takes one observation: predicts and draws. `random` gives the random draws.
     pub(super) fn step<const WORDS: usize, const INDICES: usize>(
         &mut self,
         length: NgramLength,
         direction: Direction,
         observation: Fingerprint,
-        draws: &[u32; N],
+        random: impl FnMut() -> u32,
         (evidence, consistency): (&impl Evidence<WORDS>, &mut Consistency<V, WORDS, INDICES>),
     ) -> Step {
+        let [even, odd] = &mut self.generations;
+        let (parents, children) = if self.current { (odd, even) } else { (even, odd) };
         if self.distinct == 0 {
-            let generation = &mut self.generations[usize::from(self.current)];
-            if let Some(first) = generation.first_mut() {
+            if let Some(first) = parents.first_mut() {
                 *first = Particle { multiplicity: self.wanted, ..Particle::NONE };
                 first.map.clear();
             }
             self.distinct = 1;
         }
-        let mut weigher = Weigher {
+        let parents = parents.get(..usize::from(self.distinct)).unwrap_or(&[]);
+        let mut selection = Selection {
+            parents,
+            pool: &mut self.pool,
+            predicted: &mut self.predicted,
+            likelihood: &self.likelihood,
+            observation,
             length,
             direction,
-            observation,
             evidence,
             consistency,
-            likelihood: &self.likelihood,
-            predicted: &mut self.predicted,
-            ln_best: i32::MIN,
-            ln_second: i32::MIN,
+            weights: [[0; V]; N],
+            nearest_mm: 0,
         };
-        let generation = &self.generations[usize::from(self.current)];
-        let particles = generation.get(..usize::from(self.distinct)).unwrap_or(&[]);
-        // A good weight first spares most of the others their distance.
-        let favourite = favourite(particles, &self.likelihood, observation);
-        let mut first = Candidate::IMPOSSIBLE;
-        if let Some((particle, vertex)) = favourite.and_then(|(index, vertex)| Some((particles.get(index)?, vertex))) {
-            first = weigher.weigh(particle, vertex);
-        }
-        for (index, (particle, pool)) in particles.iter().zip(&mut self.pool).enumerate() {
-            for (vertex, candidate) in (0..=particle.map.vertices()).zip(pool) {
-                *candidate = if favourite == Some((index, vertex)) { first } else { weigher.weigh(particle, vertex) };
-            }
-        }
-        let vertices_full = particles.iter().any(|particle| usize::from(particle.map.vertices()) == V);
-        let (ln_best, ln_second) = (weigher.ln_best, weigher.ln_second);
-        self.draw(observation, draws, ln_best);
-        Step { lead_q16: ln_best.saturating_sub(ln_second).min(REACH), vertices_full }
-    }
+        selection.predict();
+        selection.find_nearest();
+        let mut chosen = [Choice::default(); N];
+        let chosen = chosen.get_mut(..usize::from(self.wanted)).unwrap_or(&mut []);
+        selection.draw(chosen, random);
 
-    /// Draws the next generation from the pool: N independent draws, each candidate as often as its weight says.
-    fn draw(&mut self, observation: Fingerprint, draws: &[u32; N], ln_best: i32) {
-        let Self { generations: [even, odd], current, distinct, best, wanted, pool, likelihood, .. } = self;
-        let (parents, children) = if *current { (odd, even) } else { (even, odd) };
-        let parents = parents.get(..usize::from(*distinct)).unwrap_or(&[]);
-        let weighted = || {
-            parents.iter().zip(pool.iter()).zip(0_u8..).flat_map(|((parent, pool), index)| {
-                let candidates = (0..=parent.map.vertices()).zip(pool);
-                candidates.filter_map(move |(vertex, candidate)| {
-                    let weight = relative_weight(candidate.ln_weight, ln_best) * u32::from(parent.multiplicity);
-                    (weight > 0).then_some((index, parent, vertex, candidate, u64::from(weight)))
-                })
-            })
-        };
-        let total: u64 = weighted().map(|(.., weight)| weight).sum();
         let mut children = children.iter_mut();
+        let mut heaviest: Option<(i32, Choice)> = None;
         let mut drawn = 0;
-        let mut ln_largest = i32::MIN;
-        let mut sum = 0;
-        for (index, parent, vertex, candidate, weight) in weighted() {
-            let interval = sum..sum + weight;
-            sum += weight;
-            let chosen =
-                draws.iter().take(usize::from(*wanted)).filter(|&&draw| interval.contains(&target(draw, total)));
-            let multiplicity = chosen.count() as u8;
-            if multiplicity == 0 {
-                continue;
-            }
-            let Some(child) = children.next() else { break };
-            predict(&mut child.map, parent, vertex, observation);
-            child.place = vertex;
-            child.multiplicity = multiplicity;
-            child.parent = index;
-            child.consistency_mm = candidate.consistency_mm;
-            child.factors = WeightFactors {
-                ln_label_q16: ln_label(likelihood, parent, vertex, observation),
-                ln_consistency_q16: likelihood.ln_consistency(candidate.consistency_mm),
-                ln_size_q16: ln_size(likelihood, parent, &child.map, vertex),
-            };
-            if candidate.ln_weight > ln_largest {
-                ln_largest = candidate.ln_weight;
-                *best = drawn;
+        // The children stand in the order of the pool: equal draws follow each other once they are sorted.
+        sort(chosen);
+        let mut rest: &[Choice] = chosen;
+        while let Some((&choice, _)) = rest.split_first() {
+            let multiplicity = rest.iter().take_while(|&&other| other == choice).count();
+            rest = rest.get(multiplicity..).unwrap_or(&[]);
+            let (Some(child), Some(parent)) = (children.next(), parents.get(usize::from(choice.parent))) else { break };
+            predict(&mut child.map, parent, choice.vertex, observation);
+            child.place = choice.vertex;
+            child.multiplicity = multiplicity as u8;
+            child.parent = choice.parent;
+            (child.consistency_mm, child.factors) = selection.judge(parent, choice);
+            let ln_weight = child.factors.ln_weight_q16();
+            if heaviest.is_none_or(|(ln_heaviest, _)| ln_weight > ln_heaviest) {
+                heaviest = Some((ln_weight, choice));
+                self.best = drawn;
             }
             drawn += 1;
         }
-        *distinct = drawn;
-        *current = !*current;
+        let lead_q16 = heaviest.map_or(0, |(ln_weight, choice)| ln_weight.saturating_sub(selection.ln_rival(choice)));
+        self.distinct = drawn;
+        self.current = !self.current;
+        let vertices_full = parents.iter().any(|parent| usize::from(parent.map.vertices()) == V);
+        Step { lead_q16: lead_q16.min(PROPOSAL_REACH), vertices_full }
     }
 }
 
-/// Weighs predictions, and spares those that cannot be drawn.
-struct Weigher<'a, E, const V: usize, const WORDS: usize, const INDICES: usize> {
-    length: NgramLength,
-    direction: Direction,
-    observation: Fingerprint,
-    evidence: &'a E,
-    consistency: &'a mut Consistency<V, WORDS, INDICES>,
-    likelihood: &'a Likelihood,
-    predicted: &'a mut Map<V>,
-    ln_best: i32,
-    ln_second: i32,
-}
-
-impl<E: Evidence<WORDS>, const V: usize, const WORDS: usize, const INDICES: usize> Weigher<'_, E, V, WORDS, INDICES> {
-    /// The weight of a prediction (Eq. 6), exactly, unless it is so far behind the best one that it cannot be drawn.
-    ///
-    /// Eq. 8 is the dear factor and never above 1, so the other two bound the weight; and as the weight must reach the
-    /// best one's less [`REACH`], only distances up to a limit need to be told apart.
-    fn weigh(&mut self, parent: &Particle<V>, vertex: u8) -> Candidate {
-        let ln_label = ln_label(self.likelihood, parent, vertex, self.observation);
-        if ln_label < self.ln_best.saturating_sub(REACH) {
-            return Candidate::IMPOSSIBLE;
+/// Sorts a few choices; an insertion sort has no path that panics.
+fn sort(choices: &mut [Choice]) {
+    let mut sorted = 1;
+    while sorted < choices.len() {
+        for pair in (0..sorted).rev() {
+            if let Some([a, b]) = choices.get_mut(pair..pair + 2)
+                && *a > *b
+            {
+                core::mem::swap(a, b);
+            }
         }
-        predict(self.predicted, parent, vertex, self.observation);
-        let bound = ln_size(self.likelihood, parent, self.predicted, vertex).saturating_add(ln_label);
-        let loss = bound.saturating_sub(self.ln_best).saturating_add(REACH);
-        if loss < 0 {
-            return Candidate::IMPOSSIBLE;
-        }
-        let step_mm = self.length.label_step_mm();
-        let largest = Fingerprint::MAX.steps() >> self.length.coarsening();
-        let limit = (self.likelihood.consistency_reach_mm(loss) / step_mm).min(largest);
-        let hint = parent.consistency_mm / step_mm;
-        let distance = self.consistency.search(self.predicted, self.evidence, self.length, self.direction, hint, limit);
-        let consistency_mm = match distance {
-            Some(steps) => steps * step_mm,
-            // No finite distance is larger.
-            None if limit == largest => u16::MAX,
-            None => return Candidate::IMPOSSIBLE,
-        };
-        let ln_weight = bound.saturating_add(self.likelihood.ln_consistency(consistency_mm));
-        if ln_weight > self.ln_best {
-            self.ln_second = self.ln_best;
-            self.ln_best = ln_weight;
-        } else {
-            self.ln_second = self.ln_second.max(ln_weight);
-        }
-        Candidate { ln_weight, consistency_mm }
+        sorted += 1;
     }
 }
 
 /// Predicts that the robot went from the place of a particle to a vertex, a new one behind the last: the edge is added
 /// when it is missing, and the observation goes into the label of the vertex.
-fn predict<const V: usize>(predicted: &mut Map<V>, parent: &Particle<V>, vertex: u8, observation: Fingerprint) {
+pub(super) fn predict<const V: usize>(
+    predicted: &mut Map<V>,
+    parent: &Particle<V>,
+    vertex: u8,
+    observation: Fingerprint,
+) {
     *predicted = parent.map;
     if vertex == parent.map.vertices() {
         // The pool has no candidate for a vertex that a full map has no room for.
@@ -276,40 +228,4 @@ fn predict<const V: usize>(predicted: &mut Map<V>, parent: &Particle<V>, vertex:
     if parent.map.vertices() > 0 {
         predicted.add_edge(parent.place, vertex);
     }
-}
-
-/// ln of Eq. 7 for a prediction. The observation is compared with what the label was before; a new vertex fits.
-fn ln_label<const V: usize>(
-    likelihood: &Likelihood,
-    parent: &Particle<V>,
-    vertex: u8,
-    observation: Fingerprint,
-) -> i32 {
-    parent.map.label(vertex).map_or(0, |label| likelihood.ln_label(observation, label))
-}
-
-/// ln of Eq. 9 for a prediction, from that of its parent.
-fn ln_size<const V: usize>(likelihood: &Likelihood, parent: &Particle<V>, predicted: &Map<V>, vertex: u8) -> i32 {
-    let (before, after) = (parent.map.label(vertex), predicted.label_of(vertex));
-    if before == Some(after) {
-        return parent.factors.ln_size_q16;
-    }
-    let others = parent.map.labels().iter().enumerate().filter(|&(other, _)| other != usize::from(vertex));
-    let change = likelihood.ln_size_change(others.map(|(_, &label)| label), before, after);
-    parent.factors.ln_size_q16.saturating_add(change)
-}
-
-/// The prediction that fits its label best, as the index of the particle and the vertex.
-fn favourite<const V: usize>(
-    particles: &[Particle<V>],
-    likelihood: &Likelihood,
-    observation: Fingerprint,
-) -> Option<(usize, u8)> {
-    let predictions = particles.iter().enumerate().flat_map(|(index, particle)| {
-        (0_u8..).zip(particle.map.labels()).map(move |(vertex, &label)| {
-            let ln = likelihood.ln_label(observation, label).saturating_add(particle.factors.ln_size_q16);
-            (ln, index, vertex)
-        })
-    });
-    predictions.max_by_key(|&(ln, ..)| ln).map(|(_, index, vertex)| (index, vertex))
 }

@@ -1,18 +1,38 @@
-//! Drawing the next particles from the weighted candidates.
+//! Drawing the next particles from the predictions, by rejection.
+//!
+//! A prediction is proposed in proportion to Eq. 7 · Eq. 9, which cost little, and accepted in proportion to Eq. 8, which
+//! is dear: what is accepted is drawn in proportion to the weight of Eq. 6, and Eq. 8 is computed for what is proposed
+//! only.
 
 use crate::likelihood::NAT;
 
-/// A candidate whose weight is this many nats below the best one is never drawn: e⁻¹⁵ · 2²⁰ rounds to 0.
-pub(super) const REACH: i32 = 15 * NAT;
+/// A prediction that is this many nats below the best one is never proposed: e⁻¹⁵ · 2²⁰ rounds to 0.
+pub(super) const PROPOSAL_REACH: i32 = 15 * NAT;
 
-/// A weight relative to the best one, in units of 2⁻²⁰ and rounded: Eq. 4 without the division, since only ratios are
-/// drawn from.
-pub(super) fn relative_weight(ln_weight: i32, ln_best: i32) -> u32 {
-    let behind = ln_best.saturating_sub(ln_weight);
-    if behind >= REACH {
+/// A proposal that fits the evidence this many nats worse than the best is never accepted: e⁻²³ · 2³² rounds to 0.
+pub(super) const ACCEPTANCE_REACH: i32 = 23 * NAT;
+
+/// How many proposals a step makes before the particles that are still missing take the heaviest of those proposed. It
+/// bounds the time of a step whose proposals hardly ever fit the evidence.
+pub(super) const PROPOSALS: u16 = 256;
+
+/// How often a prediction is proposed, relative to the best one, in units of 2⁻²⁰ and rounded. Only ratios count, which
+/// spares the division of Eq. 4.
+pub(super) fn proposal_weight(ln_proposal: i32, ln_best: i32) -> u32 {
+    let behind = ln_best.saturating_sub(ln_proposal);
+    if behind >= PROPOSAL_REACH {
         return 0;
     }
-    (libm::expf(-(behind as f32) / NAT as f32) * (1 << 20) as f32 + 0.5) as u32
+    (relative(behind) * (1 << 20) as f32 + 0.5) as u32
+}
+
+/// Whether a draw accepts a proposal whose Eq. 8 is this far behind the best one.
+pub(super) fn accepts(draw: u32, behind: i32) -> bool {
+    behind < ACCEPTANCE_REACH && u64::from(draw) < (relative(behind) * (1_u64 << 32) as f32) as u64
+}
+
+fn relative(behind: i32) -> f32 {
+    libm::expf(-(behind as f32) / NAT as f32)
 }
 
 /// Where a draw points to in the sum of all weights.
@@ -28,11 +48,19 @@ mod tests {
     use super::*;
 
     #[test]
-    fn weights_are_relative_to_the_best() {
-        assert_eq!(relative_weight(-5 * NAT, -5 * NAT), 1 << 20);
-        assert_eq!(relative_weight(-6 * NAT, -5 * NAT), (2_f64.powi(20) * (-1_f64).exp()).round() as u32);
-        assert_eq!(relative_weight(-20 * NAT, -5 * NAT), 0);
-        assert_eq!(relative_weight(i32::MIN, i32::MAX), 0);
+    fn proposals_are_relative_to_the_best() {
+        assert_eq!(proposal_weight(-5 * NAT, -5 * NAT), 1 << 20);
+        assert_eq!(proposal_weight(-6 * NAT, -5 * NAT), (2_f64.powi(20) * (-1_f64).exp()).round() as u32);
+        assert_eq!(proposal_weight(-20 * NAT, -5 * NAT), 0);
+        assert_eq!(proposal_weight(i32::MIN, i32::MAX), 0);
+    }
+
+    #[test]
+    fn the_best_fit_is_always_accepted_and_the_worst_never() {
+        assert!(accepts(u32::MAX, 0));
+        assert!(!accepts(0, ACCEPTANCE_REACH) && !accepts(0, i32::MAX));
+        let half = (core::f32::consts::LN_2 * NAT as f32) as i32;
+        assert!(accepts((1 << 31) - (1 << 20), half) && !accepts((1 << 31) + (1 << 20), half));
     }
 
     #[test]

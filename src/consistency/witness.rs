@@ -1,0 +1,97 @@
+//! What refuted a distance before mostly refutes it again: walks and n-grams that are asked first.
+
+use super::{evidence::Evidence, readings::Readings, state_set::StateSet};
+use crate::map::bits;
+use crate::{Map, NgramLength};
+
+/// How many witnesses of each kind are remembered.
+const REMEMBERED: usize = 4;
+
+/// A walk on a map; the first `n` vertices count.
+pub(super) type Walk = [u8; NgramLength::MAX.get() as usize];
+
+/// Walks that no n-gram was near, and n-grams that no walk was near, on maps much like the next one. They decide no
+/// question wrongly: each is looked up in the map and the evidence at hand before it is believed.
+#[derive(Clone, Debug)]
+pub(super) struct Witnesses {
+    walks: [Walk; REMEMBERED],
+    /// The states at which the straight readings of n-grams end.
+    ends: [u16; REMEMBERED],
+    next_walk: u8,
+    next_end: u8,
+}
+
+impl Witnesses {
+    pub(super) const fn new() -> Self {
+        Self { walks: [[0; 7]; REMEMBERED], ends: [0; REMEMBERED], next_walk: 0, next_end: 0 }
+    }
+
+    pub(super) fn remember_walk(&mut self, walk: Walk) {
+        remember(&mut self.walks, &mut self.next_walk, walk);
+    }
+
+    pub(super) fn remember_end(&mut self, end: u16) {
+        remember(&mut self.ends, &mut self.next_end, end);
+    }
+
+    /// Whether a remembered walk stands in the map and is farther than `distance` from the evidence.
+    pub(super) fn refute_walks<const V: usize, const WORDS: usize, const INDICES: usize>(
+        &self,
+        map: &Map<V>,
+        evidence: &impl Evidence<WORDS>,
+        length: NgramLength,
+        distance: u16,
+        readings: &mut Readings<V, WORDS, INDICES>,
+    ) -> bool {
+        self.walks.iter().any(|walk| {
+            let mut before = None;
+            let mut states = StateSet::EMPTY;
+            for (index, &vertex) in (0..length.get()).zip(walk) {
+                if vertex >= map.vertices() || before.is_some_and(|before| map.neighbours(before) >> vertex & 1 == 0) {
+                    return false;
+                }
+                let reading = readings.at(evidence, length, (vertex, map.label_of(vertex)), index, distance);
+                states = match before {
+                    None => *reading,
+                    Some(_) => evidence.around(&states).intersection(reading),
+                };
+                before = Some(vertex);
+            }
+            states.is_empty()
+        })
+    }
+
+    /// Whether a remembered n-gram of the evidence is farther than `distance` from all walks of the map.
+    pub(super) fn refute_ngrams<const V: usize, const WORDS: usize>(
+        &self,
+        map: &Map<V>,
+        evidence: &impl Evidence<WORDS>,
+        length: NgramLength,
+        distance: u16,
+    ) -> bool {
+        let labels = evidence.straight_labels(length);
+        self.ends.iter().any(|&end| {
+            let mut reached = u64::MAX;
+            for index in 0..labels {
+                let Some(label) = evidence.straight_label(length, end.into(), index) else { return false };
+                let mut near = 0;
+                for (vertex, own) in (0_u32..).zip(map.labels()) {
+                    let is_near = (own.steps() >> length.coarsening()).abs_diff(label) <= distance;
+                    near |= u64::from(is_near) << (vertex & 63);
+                }
+                if index > 0 {
+                    near &= bits(reached).fold(0, |arriving, vertex| arriving | map.neighbours(vertex));
+                }
+                reached = near;
+            }
+            labels > 0 && reached == 0
+        })
+    }
+}
+
+fn remember<T>(remembered: &mut [T; REMEMBERED], next: &mut u8, witness: T) {
+    if let Some(slot) = remembered.get_mut(usize::from(*next) % REMEMBERED) {
+        *slot = witness;
+    }
+    *next = next.wrapping_add(1);
+}

@@ -1,0 +1,260 @@
+//! Choosing among all predictions of all particles (Section III.A): prediction phase, weights, and the draw.
+
+use super::particles::{Candidate, Distance, Particle, WeightFactors, predict};
+use super::resample::{ACCEPTANCE_REACH, PROPOSALS, accepts, proposal_weight, target};
+use crate::consistency::{Consistency, Direction, Evidence};
+use crate::likelihood::Likelihood;
+use crate::{Fingerprint, Map, NgramLength};
+
+/// A prediction: that the robot of a particle went to a vertex, a new one behind the last of its map. In the order of the
+/// pool.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
+pub(super) struct Choice {
+    pub(super) parent: u8,
+    pub(super) vertex: u8,
+}
+
+/// The particles of one place, the pool of their predictions, and what these are held against.
+pub(super) struct Selection<'a, E, const N: usize, const V: usize, const WORDS: usize, const INDICES: usize> {
+    pub(super) parents: &'a [Particle<V>],
+    pub(super) pool: &'a mut [[Candidate; V]; N],
+    pub(super) predicted: &'a mut Map<V>,
+    pub(super) likelihood: &'a Likelihood,
+    pub(super) observation: Fingerprint,
+    pub(super) length: NgramLength,
+    pub(super) direction: Direction,
+    pub(super) evidence: &'a E,
+    pub(super) consistency: &'a mut Consistency<V, WORDS, INDICES>,
+    /// How often each prediction is proposed.
+    pub(super) weights: [[u32; V]; N],
+    /// The smallest distance of Eq. 2 in the pool, in millimetres.
+    pub(super) nearest_mm: u16,
+}
+
+impl<E: Evidence<WORDS>, const N: usize, const V: usize, const WORDS: usize, const INDICES: usize>
+    Selection<'_, E, N, V, WORDS, INDICES>
+{
+    /// The prediction phase: K + 1 candidates for each particle, with Eq. 7 and 9.
+    pub(super) fn predict(&mut self) {
+        let mut ln_best = i32::MIN;
+        for (parent, candidates) in self.parents.iter().zip(self.pool.iter_mut()) {
+            for (vertex, candidate) in (0..=parent.map.vertices()).zip(candidates) {
+                let ln_label = ln_label(self.likelihood, parent, vertex, self.observation);
+                let ln_proposal = ln_size(self.likelihood, parent, vertex, self.observation).saturating_add(ln_label);
+                *candidate = Candidate { ln_proposal, distance: Distance::Unknown };
+                ln_best = ln_best.max(ln_proposal);
+            }
+        }
+        for ((parent, candidates), weights) in self.parents.iter().zip(self.pool.iter()).zip(&mut self.weights) {
+            for ((_, candidate), weight) in (0..=parent.map.vertices()).zip(candidates).zip(weights) {
+                *weight = proposal_weight(candidate.ln_proposal, ln_best) * u32::from(parent.multiplicity);
+            }
+        }
+    }
+
+    /// Finds the distance of the prediction that is nearest to the evidence, among those that can be proposed. Most of the
+    /// others are only shown to be no nearer, which takes much less than their distance.
+    pub(super) fn find_nearest(&mut self) {
+        let weights = self.weights().map(|(choice, weight)| (weight, choice));
+        let Some((_, first)) = weights.max_by_key(|&(weight, choice)| (weight, core::cmp::Reverse(choice))) else {
+            return;
+        };
+        let nearest = self.search(first, (0, self.farthest_steps()));
+        self.know(first, self.distance_of(nearest));
+        let mut nearest_steps = nearest.unwrap_or(self.farthest_steps() + 1);
+        for (index, parent) in (0_u8..).zip(self.parents) {
+            for vertex in 0..=parent.map.vertices() {
+                let choice = Choice { parent: index, vertex };
+                if choice == first || self.weight(choice) == 0 {
+                    continue;
+                }
+                let Some(nearer) = nearest_steps.checked_sub(1) else { break };
+                if let Some(steps) = self.nearest_of(choice, nearer) {
+                    nearest_steps = steps;
+                    self.know(choice, self.distance_of(Some(steps)));
+                }
+            }
+        }
+        let found = (nearest_steps <= self.farthest_steps()).then_some(nearest_steps);
+        self.nearest_mm = match self.distance_of(found) {
+            Distance::Known(distance_mm) => distance_mm,
+            Distance::Unknown | Distance::TooLarge => u16::MAX,
+        };
+    }
+
+    /// The distance of a prediction, if it is not above a limit; mostly it is.
+    fn nearest_of(&mut self, choice: Choice, limit: u16) -> Option<u16> {
+        let mut nearest = self.search(choice, (limit, limit))?;
+        let mut stride = 1;
+        while let Some(nearer) = nearest.checked_sub(1) {
+            let from = nearest.saturating_sub(stride);
+            let steps = self.search(choice, (from, nearer));
+            match steps {
+                None => break,
+                Some(steps) if steps > from => return Some(steps),
+                Some(steps) => nearest = steps,
+            }
+            stride *= 2;
+        }
+        Some(nearest)
+    }
+
+    /// N independent draws, each prediction in proportion to its weight (Eq. 6, normalised by Eq. 4).
+    pub(super) fn draw(&mut self, chosen: &mut [Choice], mut random: impl FnMut() -> u32) {
+        let total: u64 = self.weights().map(|(_, weight)| weight).sum();
+        let mut heaviest: Option<(i32, Choice)> = None;
+        let mut proposals = 0;
+        for slot in chosen {
+            loop {
+                if proposals == PROPOSALS {
+                    *slot = heaviest.map_or(*slot, |(_, choice)| choice);
+                    break;
+                }
+                proposals += 1;
+                let Some(choice) = self.propose(target(random(), total)) else { break };
+                let behind = self.ln_behind(choice);
+                let ln_weight = self.ln_proposal(choice).saturating_sub(behind);
+                if heaviest.is_none_or(|(ln_heaviest, other)| {
+                    ln_weight > ln_heaviest || (ln_weight == ln_heaviest && choice < other)
+                }) {
+                    heaviest = Some((ln_weight, choice));
+                }
+                if accepts(random(), behind) {
+                    *slot = choice;
+                    break;
+                }
+            }
+        }
+    }
+
+    /// The consistency of a prediction that was chosen, in millimetres, and the factors of its weight.
+    pub(super) fn judge(&mut self, parent: &Particle<V>, choice: Choice) -> (u16, WeightFactors) {
+        let consistency_mm = match self.distance(choice) {
+            Distance::Known(distance_mm) => distance_mm,
+            Distance::Unknown | Distance::TooLarge => u16::MAX,
+        };
+        let factors = WeightFactors {
+            ln_label_q16: ln_label(self.likelihood, parent, choice.vertex, self.observation),
+            ln_consistency_q16: self.likelihood.ln_consistency(consistency_mm),
+            ln_size_q16: ln_size(self.likelihood, parent, choice.vertex, self.observation),
+        };
+        (consistency_mm, factors)
+    }
+
+    /// ln of a bound on the weight of every prediction but one.
+    pub(super) fn ln_rival(&self, winner: Choice) -> i32 {
+        let mut ln_rival = i32::MIN;
+        for (choice, _) in self.weights().filter(|&(choice, _)| choice != winner) {
+            let distance_mm = match self.candidate(choice).map(|candidate| candidate.distance) {
+                Some(Distance::Unknown) => self.nearest_mm,
+                Some(Distance::Known(distance_mm)) => distance_mm,
+                Some(Distance::TooLarge) | None => continue,
+            };
+            let ln_weight = self.ln_proposal(choice).saturating_add(self.likelihood.ln_consistency(distance_mm));
+            ln_rival = ln_rival.max(ln_weight);
+        }
+        ln_rival
+    }
+
+    /// The prediction that a target in the sum of all weights falls to.
+    fn propose(&self, target: u64) -> Option<Choice> {
+        let mut sum = 0;
+        let mut weights = self.weights();
+        weights
+            .find(|&(_, weight)| {
+                sum += weight;
+                target < sum
+            })
+            .map(|(choice, _)| choice)
+    }
+
+    /// Every prediction and how often it is proposed, in the order of the pool.
+    fn weights(&self) -> impl Iterator<Item = (Choice, u64)> + '_ {
+        (0_u8..).zip(self.parents.iter().zip(&self.weights)).flat_map(|(parent, (particle, weights))| {
+            let weights = (0..=particle.map.vertices()).zip(weights);
+            weights.map(move |(vertex, &weight)| (Choice { parent, vertex }, u64::from(weight)))
+        })
+    }
+
+    fn weight(&self, choice: Choice) -> u32 {
+        let weights = self.weights.get(usize::from(choice.parent));
+        weights.and_then(|weights| weights.get(usize::from(choice.vertex))).copied().unwrap_or(0)
+    }
+
+    fn candidate(&self, choice: Choice) -> Option<&Candidate> {
+        self.pool.get(usize::from(choice.parent))?.get(usize::from(choice.vertex))
+    }
+
+    fn ln_proposal(&self, choice: Choice) -> i32 {
+        self.candidate(choice).map_or(i32::MIN, |candidate| candidate.ln_proposal)
+    }
+
+    /// By how much ln of Eq. 8 of a prediction is behind that of the nearest one.
+    fn ln_behind(&mut self, choice: Choice) -> i32 {
+        let ln_nearest = self.likelihood.ln_consistency(self.nearest_mm);
+        match self.distance(choice) {
+            Distance::Known(distance_mm) => ln_nearest.saturating_sub(self.likelihood.ln_consistency(distance_mm)),
+            Distance::Unknown | Distance::TooLarge => i32::MAX,
+        }
+    }
+
+    /// The distance of a prediction, searched for when it is not known yet.
+    fn distance(&mut self, choice: Choice) -> Distance {
+        let known = self.candidate(choice).map_or(Distance::TooLarge, |candidate| candidate.distance);
+        if known != Distance::Unknown {
+            return known;
+        }
+        let step_mm = self.length.label_step_mm();
+        let loss = ACCEPTANCE_REACH.saturating_sub(self.likelihood.ln_consistency(self.nearest_mm));
+        let limit = (self.likelihood.consistency_reach_mm(loss) / step_mm).min(self.farthest_steps());
+        let distance = match self.search(choice, (self.nearest_mm / step_mm, limit)) {
+            None if limit < self.farthest_steps() => Distance::TooLarge,
+            steps => self.distance_of(steps),
+        };
+        self.know(choice, distance);
+        distance
+    }
+
+    fn search(&mut self, choice: Choice, known_and_limit: (u16, u16)) -> Option<u16> {
+        let parent = self.parents.get(usize::from(choice.parent))?;
+        predict(self.predicted, parent, choice.vertex, self.observation);
+        self.consistency.search(self.predicted, self.evidence, self.length, self.direction, known_and_limit)
+    }
+
+    fn know(&mut self, choice: Choice, distance: Distance) {
+        let candidates = self.pool.get_mut(usize::from(choice.parent));
+        if let Some(candidate) = candidates.and_then(|candidates| candidates.get_mut(usize::from(choice.vertex))) {
+            candidate.distance = distance;
+        }
+    }
+
+    /// The largest finite distance, in the steps of the n-grams.
+    fn farthest_steps(&self) -> u16 {
+        Fingerprint::MAX.steps() >> self.length.coarsening()
+    }
+
+    fn distance_of(&self, steps: Option<u16>) -> Distance {
+        Distance::Known(steps.map_or(u16::MAX, |steps| steps * self.length.label_step_mm()))
+    }
+}
+
+/// ln of Eq. 7 for a prediction. The observation is compared with what the label was before; a new vertex fits.
+fn ln_label<const V: usize>(
+    likelihood: &Likelihood,
+    parent: &Particle<V>,
+    vertex: u8,
+    observation: Fingerprint,
+) -> i32 {
+    parent.map.label(vertex).map_or(0, |label| likelihood.ln_label(observation, label))
+}
+
+/// ln of Eq. 9 for a prediction, from that of its parent.
+fn ln_size<const V: usize>(likelihood: &Likelihood, parent: &Particle<V>, vertex: u8, observation: Fingerprint) -> i32 {
+    let (before, after) = (parent.map.label(vertex), parent.map.label_with(vertex, observation));
+    if before == Some(after) {
+        return parent.factors.ln_size_q16;
+    }
+    let others = parent.map.labels().iter().enumerate().filter(|&(other, _)| other != usize::from(vertex));
+    let change = likelihood.ln_size_change(others.map(|(_, &label)| label), before, after);
+    parent.factors.ln_size_q16.saturating_add(change)
+}
