@@ -1,12 +1,14 @@
 //! The input that the bench image carries is what the simulation gives.
 
 use toposlam::reference::{self, Detector};
-use toposlam_host::world::{Plan, RobotModel, Simulation};
+use toposlam::ring::Echo;
+use toposlam_host::world::{Plan, RobotModel, SONARS, Simulation};
 
-const RECORDED_MM: [u16; 200] = include!("../../src/bin/support/bench_input.rs");
+const PLACES_MM: [u16; 400] = include!("../../src/bin/support/bench_places.rs");
+const FRAMES_MM: [[u16; SONARS]; 200] = include!("../../src/bin/support/bench_frames.rs");
 
 /// The first places are enough to notice that the recording is of another drive, and take a fraction of the time.
-const COMPARED: usize = 20;
+const COMPARED_PLACES: usize = 20;
 
 #[test]
 fn the_recorded_bench_input_is_the_drive_through_the_office() {
@@ -14,7 +16,20 @@ fn the_recorded_bench_input_is_the_drive_through_the_office() {
     let simulation = Simulation::new(&plan, RobotModel::default(), 1).unwrap();
     let mut detector = Detector::new();
     detector.start(reference::PLACE, reference::RING).unwrap();
-    let places = simulation.filter_map(|(frame, _)| detector.observe(&frame));
-    let radii_mm: Vec<_> = places.map(|place| place.fingerprint.radius_mm()).take(COMPARED).collect();
-    assert_eq!(radii_mm, RECORDED_MM[..COMPARED]);
+    let (mut frames, mut places) = (0, 0);
+    for (frame, _) in simulation {
+        if let Some(recorded_mm) = FRAMES_MM.get(frames) {
+            let recorded = recorded_mm.map(|mm| if mm == 0 { Echo::Silence } else { Echo::Range { range_mm: mm } });
+            assert_eq!(frame.echoes, recorded, "frame {frames}");
+        }
+        frames += 1;
+        if let Some(place) = detector.observe(&frame) {
+            assert_eq!(place.fingerprint.radius_mm(), PLACES_MM[places], "place {places}");
+            places += 1;
+            if places == COMPARED_PLACES {
+                break;
+            }
+        }
+    }
+    assert!(frames > FRAMES_MM.len(), "{frames} frames");
 }
