@@ -256,13 +256,12 @@ pub(crate) fn filter() {
     if let Ok(ngram) = Ngram::new(any_length(), &[any_fingerprint(); 5]) {
         black_box(prior.insert(ngram).is_ok());
     }
-    let draws = black_box([7; PARTICLES]);
     for _ in 0..black_box(3) {
         let update = filter.observe(any_fingerprint());
         black_box(update.factors.ln_weight_q16());
-        black_box(filter.observe_with_draws(any_fingerprint(), &draws));
+        black_box(filter.observe_with_draws(any_fingerprint(), || black_box(7)));
         black_box(filter.observe_with_prior(any_fingerprint(), prior));
-        black_box(filter.observe_with_prior_and_draws(any_fingerprint(), prior, &draws));
+        black_box(filter.observe_with_prior_and_draws(any_fingerprint(), prior, || black_box(7)));
         black_box(prior.extend(filter.history()).is_ok());
     }
     black_box((filter.best(), filter.particles(), filter.observed(), filter.faults(), filter.config(), filter.map()));
