@@ -114,12 +114,14 @@
 //! | Definitions 3 to 5, n-grams | `ngram/mod.rs`, `ngram/table.rs` |
 //! | Definition 6, Eq. 2 and 3, consistency | `consistency/` |
 //! | Eq. 4 and 5, the filter's step | `filter/selection.rs`, `filter/resample.rs` |
-//! | Eq. 6 to 9, weights | `likelihood.rs` |
+//! | Eq. 6, the weight | `filter/particle.rs` |
+//! | Eq. 7 to 9, its factors | `likelihood.rs` |
 //! | Section III.B, localisation | `filter/mod.rs` ([`Update::vertex`]) |
 //! | Section IV.A, meet points | `place/` |
 #![cfg_attr(not(test), no_std)]
 #![forbid(unsafe_code)]
 
+mod config;
 mod consistency;
 #[cfg(feature = "defmt")]
 mod defmt;
@@ -139,9 +141,10 @@ pub mod sonar;
 #[cfg(feature = "wire")]
 pub mod wire;
 
+pub use config::{Config, ConfigError};
 pub use consistency::{Consistency, Direction, Evidence};
 pub use fault::{FaultCounters, FaultKind};
-pub use filter::{Config, ConfigError, PaperFilter, Particle, Prior, Update, WeightFactors};
+pub use filter::{PaperFilter, Particle, Prior, Update, WeightFactors};
 pub use fingerprint::{Fingerprint, FingerprintError};
 pub use history::History;
 pub use map::{Map, VerticesFull};

@@ -1,16 +1,15 @@
 //! The paper's particle filter: topological SLAM from a sequence of fingerprints (Section III).
 
-mod config;
+mod particle;
 mod particles;
 mod prior;
 mod resample;
 mod selection;
 
-pub use config::{Config, ConfigError};
-pub use particles::{Particle, WeightFactors};
+pub use particle::{Particle, WeightFactors};
 pub use prior::Prior;
 
-use crate::{Consistency, FaultCounters, FaultKind, Fingerprint, History, Map, NgramLength};
+use crate::{Config, ConfigError, Consistency, FaultCounters, FaultKind, Fingerprint, History, Map, NgramLength};
 use particles::{Particles, Step};
 use rand_core::{Rng, SeedableRng};
 use rand_xoshiro::Xoshiro128PlusPlus;

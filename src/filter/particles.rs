@@ -1,76 +1,11 @@
 //! The particles and how one generation follows another (Section III.A).
 
-use super::Config;
+use super::particle::{Particle, predict};
 use super::resample::PROPOSAL_REACH;
-use super::selection::{Choice, Selection};
+use super::selection::{Candidate, Choice, Selection};
 use crate::consistency::{Consistency, Direction, Evidence};
 use crate::likelihood::Likelihood;
-use crate::{Fingerprint, Map, NgramLength};
-
-/// The three factors of a weight (Eq. 6), as logarithms in units of 2⁻¹⁶ nats.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct WeightFactors {
-    /// ln of Eq. 7: how well the observation fits the label its vertex had before.
-    pub ln_label_q16: i32,
-    /// ln of Eq. 8: how consistent the map is with the evidence.
-    pub ln_consistency_q16: i32,
-    /// ln of Eq. 9: what the size of the map costs.
-    pub ln_size_q16: i32,
-}
-
-impl WeightFactors {
-    const ONE: Self = Self { ln_label_q16: 0, ln_consistency_q16: 0, ln_size_q16: 0 };
-
-    /// ln of the weight (Eq. 6), in units of 2⁻¹⁶ nats; saturates.
-    pub const fn ln_weight_q16(&self) -> i32 {
-        self.ln_size_q16.saturating_add(self.ln_label_q16).saturating_add(self.ln_consistency_q16)
-    }
-}
-
-/// One hypothesis: a map and the place the robot is at.
-#[derive(Clone, Copy, Debug)]
-pub struct Particle<const V: usize> {
-    /// The map.
-    pub map: Map<V>,
-    /// The vertex the robot is at.
-    pub place: u8,
-    /// How many of the N draws chose this particle.
-    pub multiplicity: u8,
-    /// The index, among the particles before the last observation, of the one this particle came from.
-    pub parent: u8,
-    /// The distance of Eq. 2 in millimetres; `u16::MAX` when it is infinite.
-    pub consistency_mm: u16,
-    /// The factors of its weight.
-    pub factors: WeightFactors,
-}
-
-impl<const V: usize> Particle<V> {
-    const NONE: Self =
-        Self { map: Map::new(), place: 0, multiplicity: 0, parent: 0, consistency_mm: 0, factors: WeightFactors::ONE };
-}
-
-/// A prediction in the pool.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Candidate {
-    /// ln of Eq. 7 · Eq. 9, how often it is proposed.
-    pub(super) ln_proposal: i32,
-    pub(super) distance: Distance,
-}
-
-/// What is known of the distance of Eq. 2 of a prediction.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Distance {
-    /// Only that no prediction is nearer to the evidence than the nearest.
-    Unknown,
-    /// The distance in millimetres; `u16::MAX` when it is infinite.
-    Known(u16),
-    /// So large that the prediction is never accepted.
-    TooLarge,
-}
-
-impl Candidate {
-    const UNSET: Self = Self { ln_proposal: 0, distance: Distance::Unknown };
-}
+use crate::{Config, Fingerprint, Map, NgramLength};
 
 /// What a step tells besides the particles.
 pub(super) struct Step {
@@ -207,25 +142,5 @@ fn sort(choices: &mut [Choice]) {
             }
         }
         sorted += 1;
-    }
-}
-
-/// Predicts that the robot went from the place of a particle to a vertex, a new one behind the last: the edge is added
-/// when it is missing, and the observation goes into the label of the vertex.
-pub(super) fn predict<const V: usize>(
-    predicted: &mut Map<V>,
-    parent: &Particle<V>,
-    vertex: u8,
-    observation: Fingerprint,
-) {
-    *predicted = parent.map;
-    if vertex == parent.map.vertices() {
-        // The pool has no candidate for a vertex that a full map has no room for.
-        let _ = predicted.add_vertex(observation);
-    } else {
-        predicted.observe(vertex, observation);
-    }
-    if parent.map.vertices() > 0 {
-        predicted.add_edge(parent.place, vertex);
     }
 }

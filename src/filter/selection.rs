@@ -1,6 +1,6 @@
 //! Choosing among all predictions of all particles (Section III.A): prediction phase, weights, and the draw.
 
-use super::particles::{Candidate, Distance, Particle, WeightFactors, predict};
+use super::particle::{Particle, WeightFactors, predict};
 use super::resample::{DISTANCE_REACH, PROPOSALS, accepts, draw_weight, target};
 use crate::consistency::{Consistency, Direction, Evidence};
 use crate::likelihood::Likelihood;
@@ -12,6 +12,29 @@ use crate::{Fingerprint, Map, NgramLength};
 pub(super) struct Choice {
     pub(super) parent: u8,
     pub(super) vertex: u8,
+}
+
+/// A prediction in the pool.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Candidate {
+    /// ln of Eq. 7 · Eq. 9, how often it is proposed.
+    ln_proposal: i32,
+    distance: Distance,
+}
+
+/// What is known of the distance of Eq. 2 of a prediction.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Distance {
+    /// Only that no prediction is nearer to the evidence than the nearest.
+    Unknown,
+    /// The distance in millimetres; `u16::MAX` when it is infinite.
+    Known(u16),
+    /// So large that the prediction is never accepted.
+    TooLarge,
+}
+
+impl Candidate {
+    pub(super) const UNSET: Self = Self { ln_proposal: 0, distance: Distance::Unknown };
 }
 
 /// The particles of one place, the pool of their predictions, and what these are held against.

@@ -39,7 +39,7 @@ impl Config {
     };
 
     /// What a filter holds before it is started: all zero.
-    pub(super) const UNSET: Self = Self {
+    pub(crate) const UNSET: Self = Self {
         ngram_length: 0,
         particles: 0,
         penalty_permille: 0,
