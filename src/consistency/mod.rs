@@ -33,7 +33,7 @@ pub enum Direction {
 /// The scratch memory of the consistency measure for maps of `V` vertices and evidence of `WORDS` words.
 ///
 /// `INDICES` is 1 for a [`History`](crate::History), whose labels read the same at every index of an n-gram, and 7 for
-/// an [`NgramTable`](crate::NgramTable). Memory: about `(2 · INDICES + 2) · V · 4 · WORDS` bytes.
+/// an [`NgramTable`](crate::NgramTable). Memory: about `4 · (2 · INDICES + 9) · V · (WORDS + 1) + 56 · WORDS` bytes.
 #[derive(Clone, Debug)]
 pub struct Consistency<const V: usize, const WORDS: usize, const INDICES: usize> {
     readings: Readings<V, WORDS, INDICES>,

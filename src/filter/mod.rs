@@ -40,7 +40,7 @@ pub struct Update {
 ///
 /// The filter is const-constructed, so that a `static` of it lies in `.bss`, and set up in place by
 /// [`PaperFilter::start`]. Equal draws of one candidate are held once, with a multiplicity. Memory: about
-/// `2 · N · (18 · V + 24) + 8 · N · V + 20 · V · WORDS + 128 · WORDS + 1400` bytes.
+/// `2 · N · (18 · V + 32) + 8 · N · V + 44 · V · (WORDS + 1) + 120 · WORDS + 1500` bytes.
 ///
 /// ```
 /// use toposlam::{Config, Fingerprint, PaperFilter};

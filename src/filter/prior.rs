@@ -5,7 +5,7 @@ use crate::{Consistency, Ngram, NgramLength, NgramTable, NgramsFull};
 /// The n-grams of an earlier exploration, at most `16 · WORDS` of them, with the scratch memory to hold maps of `V`
 /// vertices against them.
 ///
-/// Memory: about `64 · WORDS · V + 192 · WORDS` bytes.
+/// Memory: about `92 · V · (WORDS + 1) + 184 · WORDS` bytes.
 #[derive(Clone, Debug)]
 pub struct Prior<const V: usize, const WORDS: usize> {
     ngrams: NgramTable<WORDS>,
