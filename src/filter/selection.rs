@@ -1,7 +1,7 @@
 //! Choosing among all predictions of all particles (Section III.A): prediction phase, weights, and the draw.
 
 use super::particle::{Particle, WeightFactors, predict};
-use super::resample::{DISTANCE_REACH, PROPOSALS, accepts, draw_weight, target};
+use super::resample::{DISTANCE_REACH, PROPOSAL_REACH, PROPOSALS, accepts, draw_weight, target};
 use crate::consistency::{Consistency, Direction, Evidence};
 use crate::likelihood::Likelihood;
 use crate::{Fingerprint, Map, NgramLength};
@@ -82,20 +82,21 @@ impl<E: Evidence<WORDS>, const N: usize, const V: usize, const WORDS: usize, con
         let Some((_, first)) = weights.max_by_key(|&(weight, choice)| (weight, core::cmp::Reverse(choice))) else {
             return;
         };
-        let nearest = self.search(first, (0, self.farthest_steps()));
+        // One place changes a map little, so the distance is mostly near that of the parent.
+        let parent = self.parents.get(usize::from(first.parent));
+        let guess = parent.map_or(0, |parent| parent.consistency_mm) / self.length.label_step_mm();
+        let guess = guess.min(self.farthest_steps());
+        let nearest = self.nearest_of(first, guess).or_else(|| self.search(first, (guess + 1, self.farthest_steps())));
         self.know(first, self.distance_of(nearest));
         let mut nearest_steps = nearest.unwrap_or(self.farthest_steps() + 1);
-        for (index, parent) in (0_u8..).zip(self.parents) {
-            for vertex in 0..=parent.map.vertices() {
-                let choice = Choice { parent: index, vertex };
-                if choice == first || self.weight(choice) == 0 {
-                    continue;
-                }
-                let Some(nearer) = nearest_steps.checked_sub(1) else { break };
-                if let Some(steps) = self.nearest_of(choice, nearer) {
-                    nearest_steps = steps;
-                    self.know(choice, self.distance_of(Some(steps)));
-                }
+        for choice in choices(self.parents) {
+            if choice == first || self.weight(choice) == 0 {
+                continue;
+            }
+            let Some(nearer) = nearest_steps.checked_sub(1) else { break };
+            if let Some(steps) = self.nearest_of(choice, nearer) {
+                nearest_steps = steps;
+                self.know(choice, self.distance_of(Some(steps)));
             }
         }
         let found = (nearest_steps <= self.farthest_steps()).then_some(nearest_steps);
@@ -145,21 +146,26 @@ impl<E: Evidence<WORDS>, const N: usize, const V: usize, const WORDS: usize, con
     /// Weighs every prediction by all of Eq. 6, so that what is proposed from now on need not be accepted.
     fn weigh_all(&mut self) {
         let mut ln_best = i32::MIN;
-        for pass in 0..2 {
-            for (index, parent) in (0_u8..).zip(self.parents) {
-                for vertex in 0..=parent.map.vertices() {
-                    let choice = Choice { parent: index, vertex };
-                    if self.weight(choice) == 0 {
-                        continue;
-                    }
-                    let ln_weight = self.ln_proposal(choice).saturating_sub(self.ln_behind(choice));
-                    ln_best = ln_best.max(ln_weight);
-                    let weights = self.weights.get_mut(usize::from(index));
-                    if let Some(weight) = weights.and_then(|weights| weights.get_mut(usize::from(vertex)))
-                        && pass == 1
-                    {
-                        *weight = draw_weight(ln_weight, ln_best) * u32::from(parent.multiplicity);
-                    }
+        for choice in choices(self.parents) {
+            if self.candidate(choice).is_some_and(|candidate| matches!(candidate.distance, Distance::Known(_))) {
+                ln_best = ln_best.max(self.ln_weight(choice));
+            }
+        }
+        for choice in choices(self.parents) {
+            if self.weight(choice) > 0 {
+                // Farther away than this, its weight rounds to 0.
+                let reach = self.ln_proposal(choice).saturating_sub(ln_best).saturating_add(PROPOSAL_REACH);
+                self.distance(choice, reach.min(DISTANCE_REACH));
+                ln_best = ln_best.max(self.ln_weight(choice));
+            }
+        }
+        for choice in choices(self.parents) {
+            if self.weight(choice) > 0 {
+                let multiplicity = self.parents.get(usize::from(choice.parent)).map_or(0, |parent| parent.multiplicity);
+                let weight = draw_weight(self.ln_weight(choice), ln_best) * u32::from(multiplicity);
+                let weights = self.weights.get_mut(usize::from(choice.parent));
+                if let Some(slot) = weights.and_then(|weights| weights.get_mut(usize::from(choice.vertex))) {
+                    *slot = weight;
                 }
             }
         }
@@ -171,7 +177,7 @@ impl<E: Evidence<WORDS>, const N: usize, const V: usize, const WORDS: usize, con
 
     /// The consistency of a prediction that was chosen, in millimetres, and the factors of its weight.
     pub(super) fn judge(&mut self, parent: &Particle<V>, choice: Choice) -> (u16, WeightFactors) {
-        let consistency_mm = match self.distance(choice) {
+        let consistency_mm = match self.distance(choice, DISTANCE_REACH) {
             Distance::Known(distance_mm) => distance_mm,
             Distance::Unknown | Distance::TooLarge => u16::MAX,
         };
@@ -212,10 +218,7 @@ impl<E: Evidence<WORDS>, const N: usize, const V: usize, const WORDS: usize, con
 
     /// Every prediction and how often it is proposed, in the order of the pool.
     fn weights(&self) -> impl Iterator<Item = (Choice, u64)> + '_ {
-        (0_u8..).zip(self.parents.iter().zip(&self.weights)).flat_map(|(parent, (particle, weights))| {
-            let weights = (0..=particle.map.vertices()).zip(weights);
-            weights.map(move |(vertex, &weight)| (Choice { parent, vertex }, u64::from(weight)))
-        })
+        choices(self.parents).map(|choice| (choice, u64::from(self.weight(choice))))
     }
 
     fn weight(&self, choice: Choice) -> u32 {
@@ -227,6 +230,11 @@ impl<E: Evidence<WORDS>, const N: usize, const V: usize, const WORDS: usize, con
         self.pool.get(usize::from(choice.parent))?.get(usize::from(choice.vertex))
     }
 
+    /// ln of Eq. 6, relative to the largest Eq. 8.
+    fn ln_weight(&mut self, choice: Choice) -> i32 {
+        self.ln_proposal(choice).saturating_sub(self.ln_behind(choice))
+    }
+
     fn ln_proposal(&self, choice: Choice) -> i32 {
         self.candidate(choice).map_or(i32::MIN, |candidate| candidate.ln_proposal)
     }
@@ -234,20 +242,21 @@ impl<E: Evidence<WORDS>, const N: usize, const V: usize, const WORDS: usize, con
     /// By how much ln of Eq. 8 of a prediction is behind that of the nearest one.
     fn ln_behind(&mut self, choice: Choice) -> i32 {
         let ln_nearest = self.likelihood.ln_consistency(self.nearest_mm);
-        match self.distance(choice) {
+        match self.distance(choice, DISTANCE_REACH) {
             Distance::Known(distance_mm) => ln_nearest.saturating_sub(self.likelihood.ln_consistency(distance_mm)),
             Distance::Unknown | Distance::TooLarge => i32::MAX,
         }
     }
 
-    /// The distance of a prediction, searched for when it is not known yet.
-    fn distance(&mut self, choice: Choice) -> Distance {
+    /// The distance of a prediction, searched for when it is not known yet. It matters as long as ln of Eq. 8 is no more
+    /// than `reach` behind that of the nearest prediction.
+    fn distance(&mut self, choice: Choice, reach: i32) -> Distance {
         let known = self.candidate(choice).map_or(Distance::TooLarge, |candidate| candidate.distance);
         if known != Distance::Unknown {
             return known;
         }
         let step_mm = self.length.label_step_mm();
-        let loss = DISTANCE_REACH.saturating_sub(self.likelihood.ln_consistency(self.nearest_mm));
+        let loss = reach.saturating_sub(self.likelihood.ln_consistency(self.nearest_mm));
         let limit = (self.likelihood.consistency_reach_mm(loss) / step_mm).min(self.farthest_steps());
         let distance = match self.search(choice, (self.nearest_mm / step_mm, limit)) {
             None if limit < self.farthest_steps() => Distance::TooLarge,
@@ -278,6 +287,13 @@ impl<E: Evidence<WORDS>, const N: usize, const V: usize, const WORDS: usize, con
     fn distance_of(&self, steps: Option<u16>) -> Distance {
         Distance::Known(steps.map_or(u16::MAX, |steps| steps * self.length.label_step_mm()))
     }
+}
+
+/// Every prediction, in the order of the pool.
+fn choices<const V: usize>(parents: &[Particle<V>]) -> impl Iterator<Item = Choice> + '_ {
+    (0_u8..)
+        .zip(parents)
+        .flat_map(|(index, parent)| (0..=parent.map.vertices()).map(move |vertex| Choice { parent: index, vertex }))
 }
 
 /// ln of Eq. 7 for a prediction. The observation is compared with what the label was before; a new vertex fits.
