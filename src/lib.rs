@@ -121,7 +121,6 @@
 #![cfg_attr(not(test), no_std)]
 #![forbid(unsafe_code)]
 
-mod config;
 mod consistency;
 #[cfg(feature = "defmt")]
 mod defmt;
@@ -134,6 +133,7 @@ mod map;
 #[cfg(feature = "wire")]
 mod mapper;
 mod ngram;
+mod observation;
 pub mod place;
 pub mod reference;
 pub mod ring;
@@ -141,16 +141,18 @@ pub mod sonar;
 #[cfg(feature = "wire")]
 pub mod wire;
 
-pub use config::{Config, ConfigError};
 pub use consistency::{Consistency, Direction, Evidence};
 pub use fault::{FaultCounters, FaultKind};
-pub use filter::{PaperFilter, Particle, Prior, Update, WeightFactors};
+pub use filter::{
+    Config, ConfigError, PaperFilter, Particle, Prior, RobustConfig, RobustFilter, Update, WeightFactors,
+};
 pub use fingerprint::{Fingerprint, FingerprintError};
 pub use history::History;
 pub use map::{Map, VerticesFull};
 #[cfg(feature = "wire")]
 pub use mapper::{Mapper, MapperConfig, MapperError};
 pub use ngram::{Ngram, NgramError, NgramLength, NgramTable, NgramsFull};
+pub use observation::{Observation, Turn};
 
 /// The code in the README is compiled as a test.
 #[cfg(all(doctest, feature = "wire"))]

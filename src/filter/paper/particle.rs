@@ -1,26 +1,7 @@
 //! One particle: a map, the place the robot is at, and the weight (Section III.A).
 
+use crate::filter::WeightFactors;
 use crate::{Fingerprint, Map};
-
-/// The three factors of a weight (Eq. 6), as logarithms in units of 2⁻¹⁶ nats.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct WeightFactors {
-    /// ln of Eq. 7: how well the observation fits the label its vertex had before.
-    pub ln_label_q16: i32,
-    /// ln of Eq. 8: how consistent the map is with the evidence.
-    pub ln_consistency_q16: i32,
-    /// ln of Eq. 9: what the size of the map costs.
-    pub ln_size_q16: i32,
-}
-
-impl WeightFactors {
-    pub(super) const ONE: Self = Self { ln_label_q16: 0, ln_consistency_q16: 0, ln_size_q16: 0 };
-
-    /// ln of the weight (Eq. 6), in units of 2⁻¹⁶ nats; saturates.
-    pub const fn ln_weight_q16(&self) -> i32 {
-        self.ln_size_q16.saturating_add(self.ln_label_q16).saturating_add(self.ln_consistency_q16)
-    }
-}
 
 /// One hypothesis: a map and the place the robot is at.
 #[derive(Clone, Copy, Debug)]

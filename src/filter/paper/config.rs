@@ -1,7 +1,7 @@
 //! The parameters of the paper's filter.
 
+use crate::filter::ConfigError;
 use crate::{Direction, NgramLength};
-use core::fmt;
 
 /// The parameters of the paper's filter. The defaults are the paper's where it gives them.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -64,18 +64,6 @@ impl Config {
         }
     }
 }
-
-/// A field of a [`Config`] is out of its range; it holds the name of the field.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct ConfigError(pub &'static str);
-
-impl fmt::Display for ConfigError {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{} is out of its range", self.0)
-    }
-}
-
-impl core::error::Error for ConfigError {}
 
 #[cfg(test)]
 mod tests {

@@ -1,8 +1,9 @@
 //! Choosing among all predictions of all particles (Section III.A): prediction phase, weights, and the draw.
 
-use super::particle::{Particle, WeightFactors, predict};
+use super::particle::{Particle, predict};
 use super::resample::{DISTANCE_REACH, PROPOSAL_REACH, PROPOSALS, accepts, draw_weight, target};
 use crate::consistency::{Consistency, Direction, Evidence};
+use crate::filter::WeightFactors;
 use crate::likelihood::Likelihood;
 use crate::{Fingerprint, Map, NgramLength};
 

@@ -1,0 +1,45 @@
+//! The parameters of the robust filter.
+
+use crate::filter::ConfigError;
+
+/// The parameters of the robust filter. The defaults were chosen on random families of environments (docs/evaluation.md).
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct RobustConfig {
+    /// How many distinct hypotheses are kept, 1 to the filter's capacity. Default 10.
+    pub hypotheses: u8,
+    /// A first guess at the standard deviation of a fingerprint in millimetres, 1 to 1000. Default 30; the filter then
+    /// estimates it from its best map.
+    pub noise_mm: u16,
+    /// How many repair moves are tried at each place, 0 to 255. Default 6.
+    pub moves: u8,
+    /// How often a turn hint is wrong, in thousandths, 1 to 500. Default 20.
+    pub wrong_turn_permille: u16,
+    /// How often a degree is wrong, in thousandths, 1 to 500. Default 100.
+    pub wrong_degree_permille: u16,
+}
+
+impl RobustConfig {
+    /// The defaults.
+    pub const DEFAULT: Self =
+        Self { hypotheses: 10, noise_mm: 30, moves: 6, wrong_turn_permille: 20, wrong_degree_permille: 100 };
+
+    /// Checks every field for a filter with room for `capacity` hypotheses.
+    ///
+    /// # Errors
+    /// [`ConfigError`] names the first field that is out of its range.
+    pub fn check(&self, capacity: usize) -> Result<(), ConfigError> {
+        match () {
+            () if self.hypotheses == 0 || usize::from(self.hypotheses) > capacity => Err(ConfigError("hypotheses")),
+            () if !(1..=1000).contains(&self.noise_mm) => Err(ConfigError("noise_mm")),
+            () if !(1..=500).contains(&self.wrong_turn_permille) => Err(ConfigError("wrong_turn_permille")),
+            () if !(1..=500).contains(&self.wrong_degree_permille) => Err(ConfigError("wrong_degree_permille")),
+            () => Ok(()),
+        }
+    }
+}
+
+impl Default for RobustConfig {
+    fn default() -> Self {
+        Self::DEFAULT
+    }
+}
