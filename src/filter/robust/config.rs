@@ -16,12 +16,35 @@ pub struct RobustConfig {
     pub wrong_turn_permille: u16,
     /// How often a degree is wrong, in thousandths, 1 to 500. Default 100.
     pub wrong_degree_permille: u16,
+    /// Shape of the inverse-gamma prior.
+    pub shape: f32,
+    /// Price of a vertex in nats.
+    pub vertex_price: f32,
+    /// Price of an edge in nats.
+    pub edge_price: f32,
+    /// Price of an edge that is not firm in decoding.
+    pub new_edge_price: f32,
+    /// Weight of the surplus, experiment.
+    pub soft: u8,
+    /// Whether the noise is estimated.
+    pub adapt: u8,
 }
 
 impl RobustConfig {
     /// The defaults.
-    pub const DEFAULT: Self =
-        Self { hypotheses: 10, noise_mm: 30, moves: 6, wrong_turn_permille: 20, wrong_degree_permille: 100 };
+    pub const DEFAULT: Self = Self {
+        hypotheses: 10,
+        noise_mm: 30,
+        moves: 6,
+        wrong_turn_permille: 20,
+        wrong_degree_permille: 100,
+        shape: 2.0,
+        vertex_price: -1.0,
+        edge_price: 1.5,
+        new_edge_price: 3.0,
+        soft: 1,
+        adapt: 1,
+    };
 
     /// Checks every field for a filter with room for `capacity` hypotheses.
     ///

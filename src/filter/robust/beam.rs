@@ -1,0 +1,208 @@
+//! The distinct hypotheses, ranked: growing them by one place, and taking in one that a move made.
+
+use super::hypothesis::Hypothesis;
+use super::prices::Prices;
+use super::record::{Entry, Record};
+
+/// A hypothesis to be: a parent, and the vertex that its newest place is taken for.
+#[derive(Clone, Copy, Debug)]
+struct Candidate {
+    score: f32,
+    gain: f32,
+    key: u32,
+    /// The slot of the parent.
+    parent: u8,
+    vertex: u8,
+}
+
+const NONE: Candidate = Candidate { score: f32::NEG_INFINITY, gain: 0.0, key: 0, parent: 0, vertex: 0 };
+
+/// Up to `N` hypotheses of which no two have the same map and place.
+#[derive(Clone, Debug)]
+pub(super) struct Beam<const N: usize, const V: usize, const T: usize> {
+    slots: [Hypothesis<V, T>; N],
+    /// The slots of the hypotheses, the best first; behind `len` the free ones.
+    order: [u8; N],
+    len: usize,
+}
+
+impl<const N: usize, const V: usize, const T: usize> Beam<N, V, T> {
+    pub(super) const fn new() -> Self {
+        Self { slots: [Hypothesis::NONE; N], order: [0; N], len: 0 }
+    }
+
+    /// Begins with the hypothesis that knows nothing.
+    pub(super) fn clear(&mut self) {
+        for (number, slot) in (0..).zip(&mut self.order) {
+            *slot = number;
+        }
+        self.len = 1;
+        if let Some(first) = self.slots.first_mut() {
+            first.clear();
+        }
+    }
+
+    pub(super) fn len(&self) -> usize {
+        self.len
+    }
+
+    pub(super) fn get(&self, rank: usize) -> Option<&Hypothesis<V, T>> {
+        let slot = self.order.get(..self.len)?.get(rank)?;
+        self.slots.get(usize::from(*slot))
+    }
+
+    pub(super) fn get_mut(&mut self, rank: usize) -> Option<&mut Hypothesis<V, T>> {
+        let slot = self.order.get(..self.len)?.get(rank)?;
+        self.slots.get_mut(usize::from(*slot))
+    }
+
+    pub(super) fn iter(&self) -> impl Iterator<Item = &Hypothesis<V, T>> {
+        self.order.iter().take(self.len).filter_map(|&slot| self.slots.get(usize::from(slot)))
+    }
+
+    pub(super) fn each(&mut self, mut change: impl FnMut(&mut Hypothesis<V, T>)) {
+        for &slot in self.order.iter().take(self.len) {
+            if let Some(hypothesis) = self.slots.get_mut(usize::from(slot)) {
+                change(hypothesis);
+            }
+        }
+    }
+
+    /// Restores the order by score.
+    pub(super) fn sort(&mut self) {
+        let Self { slots, order, len } = self;
+        let score = |slot: u8| slots.get(usize::from(slot)).map_or(f32::NEG_INFINITY, Hypothesis::score);
+        for end in 1..*len {
+            let mut rank = end;
+            while let (Some(&before), Some(&here)) = (order.get(rank.wrapping_sub(1)), order.get(rank)) {
+                if score(before) >= score(here) {
+                    break;
+                }
+                order.swap(rank - 1, rank);
+                rank -= 1;
+            }
+        }
+    }
+
+    /// Takes the newest observation, number `index` of the record: of all predictions of all hypotheses the best
+    /// `wanted` distinct ones live on. Tells whether a map that was full lacked a vertex it wanted.
+    pub(super) fn grow(
+        &mut self,
+        prices: &Prices,
+        record: &Record<T>,
+        index: usize,
+        entry: Entry,
+        wanted: usize,
+    ) -> bool {
+        let mut chosen = [NONE; N];
+        let mut count = 0;
+        let wanted = wanted.min(N);
+        let mut full = false;
+        for &slot in self.order.iter().take(self.len) {
+            let Some(parent) = self.slots.get(usize::from(slot)) else { continue };
+            full |= usize::from(parent.vertices) == V;
+            let last = parent.vertices.min(V as u8 - 1);
+            for vertex in 0..=last {
+                // A place is never its own neighbour, unless there is no other.
+                if vertex == parent.place && !entry.begins() && last > 0 {
+                    continue;
+                }
+                let (gain, key) = parent.gain(prices, record, index, entry, vertex);
+                let candidate = Candidate { score: parent.score() + gain, gain, key, parent: slot, vertex };
+                insert(&mut chosen, &mut count, wanted, candidate);
+            }
+        }
+        let mut children = [0_u8; N];
+        for candidate in chosen.iter().take(count) {
+            if let Some(children) = children.get_mut(usize::from(candidate.parent)) {
+                *children += 1;
+            }
+        }
+        // All but the last child of a parent get a copy of it, in the slot of a hypothesis without children.
+        let mut left = children;
+        let mut free = 0;
+        for candidate in chosen.iter_mut().take(count) {
+            let parent = usize::from(candidate.parent);
+            let Some(left) = left.get_mut(parent) else { continue };
+            *left -= 1;
+            if *left > 0 {
+                while children.get(free).is_some_and(|&children| children > 0) {
+                    free += 1;
+                }
+                copy(&mut self.slots, parent, free);
+                candidate.parent = free as u8;
+                free += 1;
+            }
+        }
+        let mut taken = [false; N];
+        for (candidate, order) in chosen.iter().take(count).zip(&mut self.order) {
+            *order = candidate.parent;
+            if let (Some(hypothesis), Some(taken)) =
+                (self.slots.get_mut(usize::from(candidate.parent)), taken.get_mut(usize::from(candidate.parent)))
+            {
+                hypothesis.extend(prices, record, index, entry, candidate.vertex, candidate.gain);
+                *taken = true;
+            }
+        }
+        let free = (0..).zip(&taken).filter(|(_, taken)| !**taken).map(|(slot, _)| slot);
+        self.order.iter_mut().skip(count).zip(free).for_each(|(order, slot)| *order = slot);
+        self.len = count;
+        full
+    }
+
+    /// Takes in a hypothesis: in place of the one with the same map and place if it is better than that, else in a free
+    /// slot, else in place of the worst. Tells whether it was taken.
+    pub(super) fn insert(&mut self, hypothesis: &Hypothesis<V, T>, wanted: usize) -> bool {
+        let key = hypothesis.key();
+        let rank = self.iter().position(|held| held.key() == key);
+        let has_room = rank.is_none() && self.len < wanted.min(N);
+        if has_room {
+            self.len += 1;
+        }
+        let Some(held) = self.get_mut(rank.unwrap_or(self.len.saturating_sub(1))) else { return false };
+        if !has_room && held.score() >= hypothesis.score() {
+            return false;
+        }
+        held.clone_from(hypothesis);
+        self.sort();
+        true
+    }
+}
+
+/// Puts a candidate among the best distinct ones.
+fn insert<const N: usize>(chosen: &mut [Candidate; N], count: &mut usize, wanted: usize, candidate: Candidate) {
+    if *count == wanted && chosen.get(wanted - 1).is_some_and(|worst| candidate.score <= worst.score) {
+        return;
+    }
+    let mut slot = match chosen.iter().take(*count).position(|held| held.key == candidate.key) {
+        Some(same) if chosen.get(same).is_some_and(|held| held.score >= candidate.score) => return,
+        Some(same) => same,
+        None if *count < wanted => {
+            *count += 1;
+            *count - 1
+        }
+        None => wanted - 1,
+    };
+    while let Some(&before) = slot.checked_sub(1).and_then(|before| chosen.get(before)) {
+        if before.score >= candidate.score {
+            break;
+        }
+        if let Some(to) = chosen.get_mut(slot) {
+            *to = before;
+        }
+        slot -= 1;
+    }
+    if let Some(to) = chosen.get_mut(slot) {
+        *to = candidate;
+    }
+}
+
+fn copy<H: Clone>(slots: &mut [H], from: usize, to: usize) {
+    if from == to {
+        return;
+    }
+    let (low, high) = slots.split_at_mut_checked(from.max(to)).unwrap_or((&mut [], &mut []));
+    if let (Some(low), Some(high)) = (low.get_mut(from.min(to)), high.first_mut()) {
+        if from < to { high.clone_from(low) } else { low.clone_from(high) }
+    }
+}

@@ -1,0 +1,371 @@
+//! One hypothesis: which vertex each observation belongs to, and the map and counts that follow from that.
+
+use super::prices::Prices;
+use super::record::{Entry, Record};
+use super::tally::Tally;
+use crate::map::bits;
+
+/// No vertex: before the first place, or where the robot's way is not known.
+pub(super) const NOWHERE: u8 = u8::MAX;
+
+/// A partition of the newest `T` observations, and of all that came before them, into at most `V` vertices.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Hypothesis<const V: usize, const T: usize> {
+    pub(super) vertices: u8,
+    /// The vertex of the newest observation.
+    pub(super) place: u8,
+    /// The vertex of the place before the oldest observation of the record; [`NOWHERE`] when there is none.
+    pub(super) before: u8,
+    /// How many sequences begin in the record.
+    starts: u16,
+    /// ln P of all turn hints.
+    hints: f32,
+    /// The collapsed evidence of map and path.
+    pub(super) evidence: f32,
+    /// By how much the evidence of the map, all its paths together, exceeds that of this one path, as last computed.
+    pub(super) surplus: f32,
+    /// Identifies the map; vertices are numbered in the order of their first visit.
+    map_key: u32,
+    pub(super) path: [u8; T],
+    pub(super) tallies: [Tally; V],
+    /// What left the record.
+    settled: [Tally; V],
+    pub(super) neighbours: [u32; V],
+    /// Edges that were driven before the record begins.
+    settled_neighbours: [u32; V],
+}
+
+impl<const V: usize, const T: usize> Hypothesis<V, T> {
+    pub(super) const NONE: Self = Self {
+        vertices: 0,
+        place: 0,
+        before: 0,
+        starts: 0,
+        hints: 0.0,
+        evidence: 0.0,
+        surplus: 0.0,
+        map_key: 0,
+        path: [0; T],
+        tallies: [Tally::NONE; V],
+        settled: [Tally::NONE; V],
+        neighbours: [0; V],
+        settled_neighbours: [0; V],
+    };
+
+    pub(super) fn clear(&mut self) {
+        self.vertices = 0;
+        self.place = NOWHERE;
+        self.before = NOWHERE;
+        self.starts = 0;
+        self.hints = 0.0;
+        self.evidence = 0.0;
+        self.surplus = 0.0;
+        self.map_key = 0;
+        self.tallies.fill(Tally::NONE);
+        self.settled.fill(Tally::NONE);
+        self.neighbours.fill(0);
+        self.settled_neighbours.fill(0);
+    }
+
+    /// What hypotheses are ranked by.
+    pub(super) fn score(&self) -> f32 {
+        self.evidence + self.surplus
+    }
+
+    pub(super) fn key(&self) -> u32 {
+        keyed(self.map_key, self.vertices, self.place)
+    }
+
+    pub(super) fn tally(&self, vertex: u8) -> Tally {
+        self.tallies.get(usize::from(vertex)).copied().unwrap_or(Tally::NONE)
+    }
+
+    pub(super) fn row(&self, vertex: u8) -> u32 {
+        self.neighbours.get(usize::from(vertex)).copied().unwrap_or(0)
+    }
+
+    pub(super) fn degree(&self, vertex: u8) -> u32 {
+        self.row(vertex).count_ones()
+    }
+
+    pub(super) fn at(&self, index: usize) -> u8 {
+        self.path.get(index).copied().unwrap_or(NOWHERE)
+    }
+
+    pub(super) fn edges(&self) -> u32 {
+        let rows = self.neighbours.iter().take(usize::from(self.vertices));
+        rows.map(|row| row.count_ones()).sum::<u32>() / 2
+    }
+
+    /// How the evidence changes when the newest observation, number `index` of the record, is at a vertex, and the key
+    /// of the map then. A vertex behind the last is a new one.
+    pub(super) fn gain(
+        &self,
+        prices: &Prices,
+        record: &Record<T>,
+        index: usize,
+        entry: Entry,
+        vertex: u8,
+    ) -> (f32, u32) {
+        let is_new = vertex == self.vertices;
+        let vertices = self.vertices + u8::from(is_new);
+        let from = if entry.begins() { NOWHERE } else { self.place };
+        let mut seen = self.tally(vertex);
+        seen.include(entry);
+        let mut gain = prices.label_evidence(&seen) - prices.label_evidence(&self.tally(vertex));
+        let degree = self.degree(vertex);
+        let mut map_key = self.map_key;
+        let mut degree_then = degree;
+        if from == NOWHERE {
+            let starts = f32::from(self.starts);
+            gain -= (starts + 1.0) * ln(vertices) - starts * ln(self.vertices.max(1));
+        } else {
+            let mut left = self.tally(from);
+            let before = prices.exit_evidence(&left, self.degree(from));
+            left.exits += 1;
+            let is_new_edge = self.row(from) >> (vertex & 31) & 1 == 0;
+            gain += prices.exit_evidence(&left, self.degree(from) + u32::from(is_new_edge)) - before;
+            if is_new_edge {
+                gain -= prices.edge;
+                degree_then += 1;
+                map_key ^= edge_key(from, vertex);
+            }
+            gain += self.hint(prices, record, index, entry, vertex);
+            if is_new {
+                gain -= f32::from(self.starts) * (ln(vertices) - ln(self.vertices));
+            }
+        }
+        if degree_then != degree || entry.degree() > 0 {
+            gain += prices.exit_evidence(&seen, degree_then) - prices.exit_evidence(&self.tally(vertex), degree);
+        }
+        if is_new {
+            gain -= prices.vertex;
+        }
+        (gain, keyed(map_key, vertices, vertex))
+    }
+
+    /// Whether a vertex for observation `index` is the place before the last.
+    fn goes_back(&self, index: usize, vertex: u8) -> bool {
+        match index {
+            0 => false,
+            1 => self.before == vertex,
+            _ => self.at(index - 2) == vertex,
+        }
+    }
+
+    /// Takes the newest observation, number `index` of the record, as one of a vertex, for a gain that was computed before.
+    pub(super) fn extend(
+        &mut self,
+        prices: &Prices,
+        record: &Record<T>,
+        index: usize,
+        entry: Entry,
+        vertex: u8,
+        gain: f32,
+    ) {
+        self.evidence += gain;
+        if vertex == self.vertices {
+            self.vertices += 1;
+        }
+        if entry.begins() || self.place == NOWHERE {
+            self.starts = self.starts.saturating_add(1);
+        } else {
+            self.hints += self.hint(prices, record, index, entry, vertex);
+            if let Some(left) = self.tallies.get_mut(usize::from(self.place)) {
+                left.exits = left.exits.saturating_add(1);
+            }
+            if self.row(self.place) >> (vertex & 31) & 1 == 0 {
+                self.map_key ^= edge_key(self.place, vertex);
+                join(&mut self.neighbours, self.place, vertex);
+            }
+        }
+        if let Some(tally) = self.tallies.get_mut(usize::from(vertex)) {
+            tally.include(entry);
+        }
+        if let Some(slot) = self.path.get_mut(index) {
+            *slot = vertex;
+        }
+        self.place = vertex;
+    }
+
+    /// ln P of the turn hint of observation `index`, were it at a vertex.
+    pub(super) fn hint(&self, prices: &Prices, record: &Record<T>, index: usize, entry: Entry, vertex: u8) -> f32 {
+        let begins_before = index.checked_sub(1).and_then(|before| record.get(before)).is_some_and(Entry::begins);
+        if entry.begins() || begins_before { 0.0 } else { prices.turn(entry.turn(), self.goes_back(index, vertex)) }
+    }
+
+    /// Takes leave of the oldest observation: its counts stay. The evidence stays as it is.
+    pub(super) fn settle_oldest(&mut self, record: &Record<T>) {
+        let (Some(oldest), Some(next)) = (record.get(0), record.get(1)) else { return };
+        let vertex = self.at(0);
+        if !oldest.begins() && self.before != NOWHERE {
+            join(&mut self.settled_neighbours, self.before, vertex);
+        }
+        if let Some(settled) = self.settled.get_mut(usize::from(vertex)) {
+            settled.include(oldest);
+            if !next.begins() {
+                settled.exits = settled.exits.saturating_add(1);
+            }
+            settled.fade();
+        }
+        self.before = if next.begins() { NOWHERE } else { vertex };
+        self.path.copy_within(1.., 0);
+    }
+
+    /// Counts everything anew from a path that was changed: numbers the vertices by first visit, drops those without
+    /// visits, and computes the evidence. Cost: O(T + V).
+    pub(super) fn rebuild(&mut self, prices: &Prices, record: &Record<T>) {
+        self.renumber(record.len());
+        self.tallies = self.settled;
+        self.neighbours = self.settled_neighbours;
+        self.starts = 0;
+        self.hints = 0.0;
+        let mut from = self.before;
+        for (index, entry) in record.iter().enumerate() {
+            let vertex = self.at(index);
+            if let Some(tally) = self.tallies.get_mut(usize::from(vertex)) {
+                tally.include(entry);
+            }
+            if entry.begins() || from == NOWHERE {
+                self.starts = self.starts.saturating_add(1);
+            } else {
+                // The exit of the place before the record was counted when it left.
+                if index > 0
+                    && let Some(left) = self.tallies.get_mut(usize::from(from))
+                {
+                    left.exits = left.exits.saturating_add(1);
+                }
+                join(&mut self.neighbours, from, vertex);
+                self.hints += self.hint(prices, record, index, entry, vertex);
+            }
+            from = vertex;
+        }
+        self.place = from;
+        self.map_key = 0;
+        for vertex in 0..self.vertices {
+            for neighbour in bits(u64::from(self.row(vertex))).filter(|&neighbour| neighbour > vertex) {
+                self.map_key ^= edge_key(vertex, neighbour);
+            }
+        }
+        self.evidence = self.total(prices);
+    }
+
+    /// The evidence from the counts.
+    pub(super) fn total(&self, prices: &Prices) -> f32 {
+        let mut total = self.hints
+            - f32::from(self.vertices) * prices.vertex
+            - self.edges() as f32 * prices.edge
+            - f32::from(self.starts) * ln(self.vertices.max(1));
+        for (vertex, tally) in (0..self.vertices).zip(&self.tallies) {
+            total += prices.label_evidence(tally) + prices.exit_evidence(tally, self.degree(vertex));
+        }
+        total
+    }
+
+    fn renumber(&mut self, len: usize) {
+        let mut name = [NOWHERE; 32];
+        let mut named = 0;
+        let visits = self.path.iter().take(len).chain(core::iter::once(&self.before)).copied();
+        let unvisited = (0..self.vertices)
+            .filter(|&vertex| self.settled.get(usize::from(vertex)).is_some_and(|tally| tally.visits > 0));
+        for vertex in visits.chain(unvisited) {
+            if let Some(name) = name.get_mut(usize::from(vertex)).filter(|name| **name == NOWHERE) {
+                *name = named;
+                named += 1;
+            }
+        }
+        let name = |vertex: u8| name.get(usize::from(vertex)).copied().unwrap_or(NOWHERE);
+        self.path.iter_mut().take(len).for_each(|vertex| *vertex = name(*vertex));
+        self.before = name(self.before);
+        if self.settled_neighbours.iter().any(|&row| row != 0) || self.before != NOWHERE {
+            let (settled, rows) = (self.settled, self.settled_neighbours);
+            self.settled.fill(Tally::NONE);
+            self.settled_neighbours.fill(0);
+            for (vertex, (tally, row)) in (0..).zip(settled.into_iter().zip(rows)) {
+                let slot = usize::from(name(vertex));
+                if let (Some(to), Some(to_row)) = (self.settled.get_mut(slot), self.settled_neighbours.get_mut(slot)) {
+                    *to = tally;
+                    *to_row = bits(u64::from(row)).fold(0, |renamed, old| renamed | 1 << (name(old) & 31));
+                }
+            }
+        }
+        self.vertices = named;
+    }
+
+    /// Makes one vertex of two, in the path and in what left the record; the path may then hold the vertex twice in a row.
+    pub(super) fn merge(&mut self, kept: u8, gone: u8, len: usize) {
+        self.path.iter_mut().take(len).filter(|vertex| **vertex == gone).for_each(|vertex| *vertex = kept);
+        if self.before == gone {
+            self.before = kept;
+        }
+        let (Some(&tally), Some(&row)) =
+            (self.settled.get(usize::from(gone)), self.settled_neighbours.get(usize::from(gone)))
+        else {
+            return;
+        };
+        if let Some(settled) = self.settled.get_mut(usize::from(kept)) {
+            settled.add(&tally);
+        }
+        if let Some(settled) = self.settled.get_mut(usize::from(gone)) {
+            *settled = Tally::NONE;
+        }
+        for neighbour in bits(u64::from(row)) {
+            join(&mut self.settled_neighbours, kept, neighbour);
+            if let Some(row) = self.settled_neighbours.get_mut(usize::from(neighbour)) {
+                *row &= !(1 << (gone & 31));
+            }
+        }
+        if let Some(row) = self.settled_neighbours.get_mut(usize::from(gone)) {
+            *row = 0;
+        }
+    }
+
+    /// Counts what was merged together, before the path is found anew.
+    pub(super) fn tally_merged(&mut self, kept: u8, gone: u8) {
+        let merged = self.tally(gone);
+        if let Some(tally) = self.tallies.get_mut(usize::from(kept)) {
+            tally.add(&merged);
+        }
+        for neighbour in bits(u64::from(self.row(gone))).filter(|&neighbour| neighbour != kept) {
+            join(&mut self.neighbours, kept, neighbour);
+        }
+        for row in &mut self.neighbours {
+            *row &= !(1 << (gone & 31));
+        }
+    }
+
+    /// Whether a vertex was only visited in the record, so that it can go without a trace.
+    pub(super) fn is_recent(&self, vertex: u8) -> bool {
+        self.settled.get(usize::from(vertex)).is_some_and(|tally| tally.visits == 0) && self.before != vertex
+    }
+
+    pub(super) fn settled_row(&self, vertex: u8) -> u32 {
+        self.settled_neighbours.get(usize::from(vertex)).copied().unwrap_or(0)
+    }
+}
+
+fn join(rows: &mut [u32], a: u8, b: u8) {
+    for (from, to) in [(a, b), (b, a)] {
+        if let Some(row) = rows.get_mut(usize::from(from)) {
+            *row |= 1 << (to & 31);
+        }
+    }
+}
+
+fn ln(count: u8) -> f32 {
+    libm::logf(f32::from(count))
+}
+
+fn mix(value: u32) -> u32 {
+    let value = (value ^ value >> 16).wrapping_mul(0x7FEB_352D);
+    let value = (value ^ value >> 15).wrapping_mul(0x846C_A68B);
+    value ^ value >> 16
+}
+
+fn edge_key(a: u8, b: u8) -> u32 {
+    mix(0x1_0000 | u32::from(a.min(b)) << 8 | u32::from(a.max(b)))
+}
+
+fn keyed(map_key: u32, vertices: u8, place: u8) -> u32 {
+    map_key ^ mix(0x2_0000 | u32::from(vertices) << 8 | u32::from(place))
+}

@@ -1,0 +1,158 @@
+//! The prior of maps and the noise model: what vertices, edges, labels and moves between places cost, in nats.
+
+use super::config::RobustConfig;
+use super::record::DEGREE_MAX;
+use super::tally::Tally;
+use crate::{Fingerprint, Turn};
+
+/// The range of labels on which the mean of a vertex is uniform a priori, in steps: 2 m.
+const LABEL_RANGE_STEPS: f32 = 1000.0;
+
+const HALF_LN_2_PI: f32 = 0.918_938_5;
+
+/// The prices of one run; the scale of the noise changes with what the best map shows.
+#[derive(Clone, Debug)]
+pub(super) struct Prices {
+    /// Shape of the inverse-gamma prior of a vertex's variance.
+    pub(super) shape: f32,
+    /// Scale of that prior, in steps²: shape · (standard deviation)².
+    pub(super) scale: f32,
+    /// What does not depend on the vertex in its label evidence.
+    label_constant: f32,
+    pub(super) vertex: f32,
+    pub(super) edge: f32,
+    /// What the decoder charges for an edge that is not established.
+    pub(super) new_edge: f32,
+    /// ln P of a turn hint that is right, and of one that is wrong.
+    turn: [f32; 2],
+    /// ln P of a degree that is right, off by one, and off by more.
+    degree: [f32; 3],
+}
+
+impl Prices {
+    pub(super) const fn new() -> Self {
+        Self {
+            shape: 0.0,
+            scale: 0.0,
+            label_constant: 0.0,
+            vertex: 0.0,
+            edge: 0.0,
+            new_edge: 0.0,
+            turn: [0.0; 2],
+            degree: [0.0; 3],
+        }
+    }
+
+    pub(super) fn configure(&mut self, config: &RobustConfig) {
+        self.shape = config.shape;
+        self.vertex = config.vertex_price;
+        self.edge = config.edge_price;
+        self.new_edge = config.new_edge_price;
+        let wrong = f32::from(config.wrong_turn_permille) / 1000.0;
+        self.turn = [libm::logf(1.0 - wrong), libm::logf(wrong)];
+        let wrong = f32::from(config.wrong_degree_permille) / 1000.0;
+        self.degree = [libm::logf(1.0 - wrong), libm::logf(wrong / 2.0), libm::logf(wrong / 100.0)];
+        self.set_noise(f32::from(config.noise_mm) / f32::from(Fingerprint::STEP_MM));
+    }
+
+    /// Takes a new standard deviation of the labels, in steps.
+    pub(super) fn set_noise(&mut self, deviation_steps: f32) {
+        self.scale = self.shape * deviation_steps * deviation_steps;
+        self.label_constant =
+            HALF_LN_2_PI - libm::logf(LABEL_RANGE_STEPS) - ln_gamma(self.shape) + self.shape * libm::logf(self.scale);
+    }
+
+    /// ln of the density of all labels seen at a vertex, its mean and variance integrated out.
+    pub(super) fn label_evidence(&self, tally: &Tally) -> f32 {
+        if tally.visits == 0 {
+            return 0.0;
+        }
+        let visits = f32::from(tally.visits);
+        let shape = self.shape + 0.5 * (visits - 1.0);
+        self.label_constant - visits * HALF_LN_2_PI - 0.5 * libm::logf(visits) + ln_gamma(shape)
+            - shape * libm::logf(self.scale + 0.5 * tally.scatter())
+    }
+
+    /// ln of the probability of the moves that left a vertex, and of the degrees seen at it: uniform over its ways.
+    pub(super) fn exit_evidence(&self, tally: &Tally, degree: u32) -> f32 {
+        let exits = f32::from(tally.exits);
+        let ln_ways = |ways: u32| libm::logf(ways.max(1) as f32);
+        if !tally.knows_degrees() {
+            return -exits * ln_ways(degree);
+        }
+        let most = u32::from(DEGREE_MAX).max(degree);
+        let terms = (degree.max(1)..=most).map(|ways| self.degree_evidence(tally, ways) - exits * ln_ways(ways));
+        let best = terms.clone().fold(f32::NEG_INFINITY, f32::max);
+        let sum: f32 = terms.map(|term| libm::expf(term - best)).sum();
+        best + libm::logf(sum) - ln_ways(u32::from(DEGREE_MAX))
+    }
+
+    /// The number of ways of a vertex that explains its exits and degrees best, at least those on the map.
+    pub(super) fn likely_degree(&self, tally: &Tally, degree: u32) -> u32 {
+        let least = degree.max(1);
+        if !tally.knows_degrees() {
+            return least;
+        }
+        let exits = f32::from(tally.exits);
+        let mut best = (f32::NEG_INFINITY, least);
+        for ways in least..=u32::from(DEGREE_MAX).max(least) {
+            let evidence = self.degree_evidence(tally, ways) - exits * libm::logf(ways as f32);
+            if evidence > best.0 {
+                best = (evidence, ways);
+            }
+        }
+        best.1
+    }
+
+    fn degree_evidence(&self, tally: &Tally, ways: u32) -> f32 {
+        let seen = (1..).zip(tally.degrees.iter().skip(1));
+        seen.filter(|(_, count)| **count > 0).map(|(degree, &count)| f32::from(count) * self.degree(degree, ways)).sum()
+    }
+
+    /// ln P of a degree that was seen at a place with so many ways; 0 for an unknown degree.
+    pub(super) fn degree(&self, seen: u8, ways: u32) -> f32 {
+        let [right, near, far] = self.degree;
+        match (seen, u32::from(seen).abs_diff(ways.min(u32::from(DEGREE_MAX)))) {
+            (0, _) => 0.0,
+            (_, 0) => right,
+            (_, 1) => near,
+            _ => far,
+        }
+    }
+
+    /// ln P of a turn hint, given whether the robot went back.
+    pub(super) fn turn(&self, hint: Option<Turn>, went_back: bool) -> f32 {
+        let [right, wrong] = self.turn;
+        match hint {
+            None => 0.0,
+            Some(hint) => {
+                if (hint == Turn::Back) == went_back {
+                    right
+                } else {
+                    wrong
+                }
+            }
+        }
+    }
+}
+
+/// ln Γ for arguments from 0.25 on, to 10⁻⁵ (Stirling's series behind a shift by 4).
+pub(super) fn ln_gamma(x: f32) -> f32 {
+    let (shifted, shift) =
+        if x < 4.0 { (x + 4.0, libm::logf(x * (x + 1.0) * (x + 2.0) * (x + 3.0))) } else { (x, 0.0) };
+    let inverse = 1.0 / shifted;
+    (shifted - 0.5) * libm::logf(shifted) - shifted + HALF_LN_2_PI + inverse * (1.0 / 12.0 - inverse * inverse / 360.0)
+        - shift
+}
+
+/// The derivative of ln Γ for arguments from 0.25 on, to 10⁻⁴.
+pub(super) fn digamma(x: f32) -> f32 {
+    let mut shifted = x;
+    let mut shift = 0.0;
+    while shifted < 4.0 {
+        shift += 1.0 / shifted;
+        shifted += 1.0;
+    }
+    let inverse = 1.0 / shifted;
+    libm::logf(shifted) - 0.5 * inverse - inverse * inverse / 12.0 - shift
+}

@@ -1,0 +1,108 @@
+//! The newest observations, packed: what every hypothesis explains.
+
+use crate::{Fingerprint, Observation, Turn};
+
+/// The largest degree that is told apart; larger ones count as this.
+pub(super) const DEGREE_MAX: u8 = 7;
+
+const TURN_BACK: u8 = 1;
+const TURN_ON: u8 = 2;
+const DEGREE_SHIFT: u8 = 2;
+const BEGINS: u8 = 1 << 5;
+
+/// The newest `T` observations, the oldest first: 3 bytes each.
+#[derive(Clone, Debug)]
+pub(super) struct Record<const T: usize> {
+    steps: [u16; T],
+    /// Turn in bits 0 and 1, degree in bits 2 to 4, bit 5 for the first place of a sequence.
+    hints: [u8; T],
+    len: usize,
+}
+
+/// One observation as the inference reads it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Entry {
+    pub(super) steps: u16,
+    hints: u8,
+}
+
+impl Entry {
+    pub(super) const fn begins(self) -> bool {
+        self.hints & BEGINS != 0
+    }
+
+    pub(super) const fn turn(self) -> Option<Turn> {
+        match self.hints & 3 {
+            TURN_BACK => Some(Turn::Back),
+            TURN_ON => Some(Turn::On),
+            _ => None,
+        }
+    }
+
+    /// The degree, 1 to [`DEGREE_MAX`]; 0 when it is unknown.
+    pub(super) const fn degree(self) -> u8 {
+        self.hints >> DEGREE_SHIFT & DEGREE_MAX
+    }
+}
+
+impl<const T: usize> Record<T> {
+    pub(super) const fn new() -> Self {
+        Self { steps: [0; T], hints: [0; T], len: 0 }
+    }
+
+    pub(super) fn clear(&mut self) {
+        self.len = 0;
+    }
+
+    pub(super) fn len(&self) -> usize {
+        self.len
+    }
+
+    pub(super) fn is_full(&self) -> bool {
+        self.len == T
+    }
+
+    /// Drops the oldest observation. The hypotheses must have taken leave of it.
+    pub(super) fn drop_oldest(&mut self) {
+        self.steps.copy_within(1.., 0);
+        self.hints.copy_within(1.., 0);
+        self.len = self.len.saturating_sub(1);
+    }
+
+    /// Appends an observation; nothing happens when the record is full.
+    pub(super) fn push(&mut self, observation: &Observation) {
+        let entry = packed(observation);
+        if let (Some(steps), Some(hints)) = (self.steps.get_mut(self.len), self.hints.get_mut(self.len)) {
+            (*steps, *hints) = (entry.steps, entry.hints);
+            self.len += 1;
+        }
+    }
+
+    pub(super) fn get(&self, index: usize) -> Option<Entry> {
+        match (self.steps.get(index), self.hints.get(index)) {
+            (Some(&steps), Some(&hints)) if index < self.len => Some(Entry { steps, hints }),
+            _ => None,
+        }
+    }
+
+    /// All observations, the oldest first.
+    pub(super) fn iter(&self) -> impl Iterator<Item = Entry> + '_ {
+        let all = self.steps.iter().zip(&self.hints).take(self.len);
+        all.map(|(&steps, &hints)| Entry { steps, hints })
+    }
+}
+
+/// An observation as an entry of the record.
+pub(super) fn packed(observation: &Observation) -> Entry {
+    let turn = match observation.turn {
+        None => 0,
+        Some(Turn::Back) => TURN_BACK,
+        Some(Turn::On) => TURN_ON,
+    };
+    let degree = observation.degree.unwrap_or(0).min(DEGREE_MAX);
+    let begins = if observation.begins { BEGINS } else { 0 };
+    Entry {
+        steps: observation.fingerprint.steps().min(Fingerprint::MAX.steps()),
+        hints: turn | degree << DEGREE_SHIFT | begins,
+    }
+}
