@@ -42,6 +42,14 @@ impl<const N: usize, const V: usize, const T: usize> Beam<N, V, T> {
         }
     }
 
+    /// Begins with one hypothesis.
+    pub(super) fn begin_with(&mut self, hypothesis: &Hypothesis<V, T>) {
+        self.clear();
+        if let Some(first) = self.slots.first_mut() {
+            first.clone_from(hypothesis);
+        }
+    }
+
     pub(super) fn len(&self) -> usize {
         self.len
     }

@@ -28,6 +28,8 @@ pub struct RobustConfig {
     pub soft: u8,
     /// Whether the noise is estimated.
     pub adapt: u8,
+    /// weight.
+    pub weight: f32,
 }
 
 impl RobustConfig {
@@ -43,7 +45,8 @@ impl RobustConfig {
         edge_price: 1.5,
         new_edge_price: 3.0,
         soft: 1,
-        adapt: 1,
+        adapt: 15,
+        weight: 1.0,
     };
 
     /// Checks every field for a filter with room for `capacity` hypotheses.

@@ -8,6 +8,12 @@ use crate::map::bits;
 /// No vertex: before the first place, or where the robot's way is not known.
 pub(super) const NOWHERE: u8 = u8::MAX;
 
+/// The price of a path that stays at one vertex for two places: such a path is never kept.
+const STANDSTILL: f32 = 1e6;
+
+/// A loss of evidence by the labels alone that nothing makes up for.
+const HOPELESS: f32 = -30.0;
+
 /// A partition of the newest `T` observations, and of all that came before them, into at most `V` vertices.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Hypothesis<const V: usize, const T: usize> {
@@ -216,6 +222,11 @@ impl<const V: usize, const T: usize> Hypothesis<V, T> {
     /// visits, and computes the evidence. Cost: O(T + V).
     pub(super) fn rebuild(&mut self, prices: &Prices, record: &Record<T>) {
         self.renumber(record.len());
+        self.recount(prices, record);
+    }
+
+    /// As [`Hypothesis::rebuild`], with the numbers as they are.
+    pub(super) fn recount(&mut self, prices: &Prices, record: &Record<T>) {
         self.tallies = self.settled;
         self.neighbours = self.settled_neighbours;
         self.starts = 0;
@@ -257,6 +268,9 @@ impl<const V: usize, const T: usize> Hypothesis<V, T> {
             - self.edges() as f32 * prices.edge
             - f32::from(self.starts) * ln(self.vertices.max(1));
         for (vertex, tally) in (0..self.vertices).zip(&self.tallies) {
+            if self.row(vertex) >> (vertex & 31) & 1 == 1 {
+                total -= STANDSTILL;
+            }
             total += prices.label_evidence(tally) + prices.exit_evidence(tally, self.degree(vertex));
         }
         total
@@ -316,6 +330,43 @@ impl<const V: usize, const T: usize> Hypothesis<V, T> {
             }
         }
         if let Some(row) = self.settled_neighbours.get_mut(usize::from(gone)) {
+            *row = 0;
+        }
+    }
+
+    /// How the evidence changes when two vertices that are no neighbours become one, but for the turn hints; −∞ for
+    /// neighbours.
+    pub(super) fn merge_gain(&self, prices: &Prices, a: u8, b: u8) -> f32 {
+        if self.row(a) >> (b & 31) & 1 == 1 {
+            return f32::NEG_INFINITY;
+        }
+        let (one, other) = (self.tally(a), self.tally(b));
+        let mut merged = one;
+        merged.add(&other);
+        let (row_a, row_b) = (self.row(a), self.row(b));
+        let mut gain = prices.label_evidence(&merged) - prices.label_evidence(&one) - prices.label_evidence(&other);
+        if gain < HOPELESS {
+            return gain;
+        }
+        gain += prices.exit_evidence(&merged, (row_a | row_b).count_ones())
+            - prices.exit_evidence(&one, row_a.count_ones())
+            - prices.exit_evidence(&other, row_b.count_ones());
+        for neighbour in bits(u64::from(row_a & row_b)) {
+            let tally = self.tally(neighbour);
+            let degree = self.degree(neighbour);
+            gain += prices.edge + prices.exit_evidence(&tally, degree - 1) - prices.exit_evidence(&tally, degree);
+        }
+        gain + prices.vertex + f32::from(self.starts) * (ln(self.vertices) - ln(self.vertices.max(2) - 1))
+    }
+
+    /// Makes one vertex of two in everything but the numbers of the others; a path that visits both in a row then stays.
+    pub(super) fn unite(&mut self, kept: u8, gone: u8, len: usize) {
+        self.merge(kept, gone, len);
+        self.tally_merged(kept, gone);
+        if let Some(tally) = self.tallies.get_mut(usize::from(gone)) {
+            *tally = Tally::NONE;
+        }
+        if let Some(row) = self.neighbours.get_mut(usize::from(gone)) {
             *row = 0;
         }
     }

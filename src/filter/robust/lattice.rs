@@ -213,7 +213,8 @@ impl<const V: usize> Model<V> {
         for vertex in (0..self.vertices).filter(|vertex| allowed >> (vertex & 31) & 1 == 1) {
             let fit = self.fit(prices, vertex, entry);
             let best = if column.len == 0 { f32::NEG_INFINITY } else { column.fits.first().copied().unwrap_or(0.0) };
-            if fit >= best - REACH {
+            // Two stay in any case: no place follows itself, so one alone would lead nowhere.
+            if fit >= best - REACH || column.len < 2 {
                 column.insert(vertex, fit);
             }
         }

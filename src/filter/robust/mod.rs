@@ -100,13 +100,18 @@ impl<const N: usize, const V: usize, const HISTORY: usize> RobustFilter<N, V, HI
         }
         let place_seed = self.seed.wrapping_add(u64::from(self.observed).wrapping_mul(0x9E37_79B9_7F4A_7C15));
         let mut random = Xoshiro128PlusPlus::seed_from_u64(place_seed);
-        self.soften(0);
-        self.beam.sort();
+        for k in 0..self.config.soft {
+            self.soften(if k % 2 == 0 { 0 } else { self.observed as usize % self.beam.len().max(1) });
+            self.beam.sort();
+        }
         for number in 0..self.config.moves {
             self.repair(number, &mut random);
         }
         self.observed = self.observed.wrapping_add(1);
-        if self.config.adapt > 0 && self.observed >= 20 && self.observed.is_multiple_of(NOISE_EVERY) {
+        if self.config.adapt > 0
+            && self.observed >= 10
+            && self.observed.is_multiple_of(if self.observed < 40 { 5 } else { NOISE_EVERY })
+        {
             self.estimate_noise();
         }
         self.publish()
@@ -119,6 +124,7 @@ impl<const N: usize, const V: usize, const HISTORY: usize> RobustFilter<N, V, HI
             record: &self.record,
             model: &mut self.model,
             decoder: &mut self.decoder,
+            forward: &mut self.forward,
             random,
         };
         let rank = if number.is_multiple_of(2) {
@@ -131,10 +137,6 @@ impl<const N: usize, const V: usize, const HISTORY: usize> RobustFilter<N, V, HI
         if !workshop.change(&mut self.draft) {
             return;
         }
-        if self.config.soft > 0 {
-            self.model.read(&self.prices, &self.record, &self.draft, Weighing::Expected);
-            self.draft.surplus = self.forward.surplus(&self.prices, &self.record, &self.model, &self.draft);
-        }
         self.beam.insert(&self.draft, usize::from(self.config.hypotheses));
     }
 
@@ -145,7 +147,8 @@ impl<const N: usize, const V: usize, const HISTORY: usize> RobustFilter<N, V, HI
         }
         let Some(hypothesis) = self.beam.get_mut(rank) else { return };
         self.model.read(&self.prices, &self.record, hypothesis, Weighing::Expected);
-        hypothesis.surplus = self.forward.surplus(&self.prices, &self.record, &self.model, hypothesis);
+        hypothesis.surplus =
+            self.prices.weight * self.forward.surplus(&self.prices, &self.record, &self.model, hypothesis);
     }
 
     /// Takes the scale of the noise from the best map and weighs all hypotheses anew.
@@ -160,7 +163,35 @@ impl<const N: usize, const V: usize, const HISTORY: usize> RobustFilter<N, V, HI
         if freedom == 0 {
             return;
         }
-        let deviation = libm::sqrtf(scatter / freedom as f32).clamp(2.0, 150.0);
+        let mut deviation = libm::sqrtf(scatter / freedom as f32);
+        if self.config.adapt > 1 {
+            let mut histogram = [0_u16; 256];
+            let mut pairs = 0_u16;
+            for index in 2..self.record.len() {
+                if let (Some(a), Some(b), Some(c)) =
+                    (self.record.get(index - 2), self.record.get(index - 1), self.record.get(index))
+                {
+                    if b.begins() || c.begins() {
+                        continue;
+                    }
+                    let d = usize::from(a.steps.abs_diff(c.steps));
+                    histogram[d.min(255)] += 1;
+                    pairs += 1;
+                }
+            }
+            let mut below = 0;
+            let wanted = f32::from(pairs) * 0.2;
+            let q = histogram
+                .iter()
+                .position(|&n| {
+                    below += n;
+                    f32::from(below) >= wanted
+                })
+                .unwrap_or(255);
+            let estimate = (q as f32 + 0.5) / 0.82;
+            deviation = deviation.min(estimate * f32::from(self.config.adapt) / 10.0);
+        }
+        let deviation = deviation.clamp(2.0, 150.0);
         self.prices.set_noise(deviation);
         let prices = &self.prices;
         self.beam.each(|hypothesis| hypothesis.evidence = hypothesis.total(prices));
@@ -245,15 +276,14 @@ impl<const N: usize, const V: usize, const HISTORY: usize> RobustFilter<N, V, HI
         self.draft.vertices = path.iter().max().map_or(0, |last| last + 1);
         self.draft.rebuild(&self.prices, &self.record);
         self.model.read(&self.prices, &self.record, &self.draft, Weighing::Expected);
-        self.draft.surplus = self.forward.surplus(&self.prices, &self.record, &self.model, &self.draft);
+        self.draft.surplus =
+            self.prices.weight * self.forward.surplus(&self.prices, &self.record, &self.model, &self.draft);
         if self.config.soft == 0 {
             self.draft.surplus = 0.0;
         }
         let truth = self.draft.score();
         let key = self.draft.key();
-        self.beam.clear();
-        self.beam.each(|hypothesis| hypothesis.evidence = -1e9);
-        self.beam.insert(&self.draft.clone(), usize::from(self.config.hypotheses));
+        self.beam.begin_with(&self.draft);
         let mut random = Xoshiro128PlusPlus::seed_from_u64(1);
         for number in 0..moves {
             self.repair(number as u8, &mut random);

@@ -23,6 +23,7 @@ pub(super) struct Prices {
     pub(super) edge: f32,
     /// What the decoder charges for an edge that is not established.
     pub(super) new_edge: f32,
+    pub(super) weight: f32,
     /// ln P of a turn hint that is right, and of one that is wrong.
     turn: [f32; 2],
     /// ln P of a degree that is right, off by one, and off by more.
@@ -38,6 +39,7 @@ impl Prices {
             vertex: 0.0,
             edge: 0.0,
             new_edge: 0.0,
+            weight: 0.0,
             turn: [0.0; 2],
             degree: [0.0; 3],
         }
@@ -47,6 +49,7 @@ impl Prices {
         self.shape = config.shape;
         self.vertex = config.vertex_price;
         self.edge = config.edge_price;
+        self.weight = config.weight;
         self.new_edge = config.new_edge_price;
         let wrong = f32::from(config.wrong_turn_permille) / 1000.0;
         self.turn = [libm::logf(1.0 - wrong), libm::logf(wrong)];
