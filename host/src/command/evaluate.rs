@@ -3,15 +3,21 @@
 use anyhow::{Context, ensure};
 use clap::{Args, ValueEnum};
 use indicatif::{ProgressBar, ProgressStyle};
-use std::{num::NonZeroUsize, path::PathBuf};
+use std::{
+    fs,
+    num::NonZeroUsize,
+    path::{Path, PathBuf},
+};
 use toposlam::{Config, Direction, NgramLength, RobustConfig};
 use toposlam_host::evaluation::{
     case::{Case, Placements},
     environment::Environment,
+    export::export,
     family::Family,
+    figure::{Pair, Quantity, draw},
     hints::Hints,
     prior::PriorSource,
-    report::{Report, SettingsReport},
+    report::{Report, Row, SettingsReport},
     run::{Filter, Settings, evaluate},
 };
 
@@ -24,6 +30,12 @@ pub(crate) struct Arguments {
     course: CourseArguments,
     #[command(flatten)]
     filter: FilterArguments,
+    /// Write what the filter sees on each path, and the truth, as files below this directory.
+    #[arg(long, value_name = "DIR")]
+    export: Option<PathBuf>,
+    /// Run both filters on the same paths, and draw the paper's Fig. 4 and 5 for both here: fig4.svg and fig5.svg.
+    #[arg(long, value_name = "DIR", conflicts_with = "filter")]
+    plot: Option<PathBuf>,
     /// What to print on the standard output.
     #[arg(long, default_value = "json")]
     format: Format,
@@ -160,30 +172,65 @@ fn permille(text: &str) -> Result<u16, String> {
 }
 
 pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
-    let filter = arguments.filter.chosen()?;
-    let settings = arguments.course.settings(filter)?;
+    let filters = arguments.filter.chosen(arguments.plot.is_some())?;
+    let evaluations =
+        filters.iter().map(|&filter| arguments.course.settings(filter)).collect::<anyhow::Result<Vec<_>>>()?;
+    let settings = &evaluations[0];
     // Everything that can be wrong with the files is known before the first path is driven.
     let cases = arguments.cases.load()?;
-    let mut report = Report { settings: SettingsReport::of(&settings, &[filter]), rows: Vec::new() };
+    if let Some(directory) = &arguments.export {
+        export(directory, &cases, settings).context("--export")?;
+    }
+    let mut report = Report { settings: SettingsReport::of(settings, &filters), rows: Vec::new() };
     for case in &cases {
-        let bar = ProgressBar::new(settings.paths as u64).with_message(case.name.clone());
-        bar.set_style(ProgressStyle::with_template("{msg} {wide_bar} {pos}/{len} paths {eta}")?);
-        let rows = evaluate(case, &settings, || bar.inc(1)).with_context(|| case.name.clone())?;
-        bar.finish_and_clear();
-        if let Some(row) = rows.first() {
-            if row.paths_not_exhaustive > 0 {
-                let (name, missed, paths) = (&row.name, row.paths_not_exhaustive, row.paths);
-                eprintln!("{name}: {missed} of {paths} paths do not traverse every edge");
-            }
-            if row.vertices_full > 0 {
-                eprintln!("{}: a map had no room for a vertex, {} times in all", row.name, row.vertices_full);
-            }
+        for settings in &evaluations {
+            report.rows.extend(evaluate_with_progress(case, settings)?);
         }
-        report.rows.extend(rows);
+    }
+    if let Some(directory) = &arguments.plot {
+        plot(directory, &cases, &report.rows, settings.longest()).context("--plot")?;
     }
     match arguments.format {
         Format::Json => println!("{}", serde_json::to_string(&report)?),
         Format::Table => print!("{report}"),
+    }
+    Ok(())
+}
+
+/// Evaluates one filter in one case, with a bar on the standard error, and says there what a reader should know.
+fn evaluate_with_progress(case: &Case, settings: &Settings) -> anyhow::Result<Vec<Row>> {
+    let title = format!("{}, {} filter", case.name, settings.filter.name());
+    let bar = ProgressBar::new(settings.paths as u64).with_message(title.clone());
+    bar.set_style(ProgressStyle::with_template("{msg} {wide_bar} {pos}/{len} paths {eta}")?);
+    let rows = evaluate(case, settings, || bar.inc(1)).with_context(|| title.clone())?;
+    bar.finish_and_clear();
+    if let Some(row) = rows.first() {
+        if row.paths_not_exhaustive > 0 {
+            eprintln!("{title}: {} of {} paths do not traverse every edge", row.paths_not_exhaustive, row.paths);
+        }
+        if row.vertices_full > 0 {
+            eprintln!("{title}: a map had no room for a vertex, {} times in all", row.vertices_full);
+        }
+    }
+    Ok(rows)
+}
+
+/// Draws both filters side by side at the last check point.
+fn plot(directory: &Path, cases: &[Case], rows: &[Row], length: usize) -> anyhow::Result<()> {
+    let judged = |filter| rows.iter().filter(move |row| row.filter == filter && row.length == length);
+    let pairs: Vec<Pair> = cases
+        .iter()
+        .zip(judged("robust").zip(judged("paper")))
+        .map(|(case, (robust, paper))| {
+            let mut places = case.environments.iter().map(|environment| environment.places().len());
+            let first = places.next();
+            Pair { rows: [robust, paper], places: first.filter(|&first| places.all(|places| places == first)) }
+        })
+        .collect();
+    fs::create_dir_all(directory).with_context(|| directory.display().to_string())?;
+    for (name, quantity) in [("fig4.svg", Quantity::Consistency), ("fig5.svg", Quantity::Vertices)] {
+        let file = directory.join(name);
+        fs::write(&file, draw(quantity, &pairs)).with_context(|| file.display().to_string())?;
     }
     Ok(())
 }
@@ -231,7 +278,8 @@ impl CourseArguments {
 }
 
 impl FilterArguments {
-    fn chosen(&self) -> anyhow::Result<Filter> {
+    /// The filter that was asked for, or both, ours first.
+    fn chosen(&self, both: bool) -> anyhow::Result<Vec<Filter>> {
         let of_robust = [
             ("--noise-mm", self.noise_mm.is_some()),
             ("--moves", self.moves.is_some()),
@@ -244,13 +292,16 @@ impl FilterArguments {
             ("--sigma-consistency-mm", self.sigma_consistency_mm.is_some()),
             ("--penalty", self.penalty.is_some()),
         ];
+        if both {
+            return Ok(vec![self.robust(), self.paper()]);
+        }
         let (filter, other, foreign) = match self.filter {
             FilterChoice::Robust => (self.robust(), "paper", of_paper),
             FilterChoice::Paper => (self.paper(), "robust", of_robust),
         };
         let given = foreign.iter().find(|(_, given)| *given);
         ensure!(given.is_none(), "{} needs --filter {other}", given.map_or("", |(name, _)| name));
-        Ok(filter)
+        Ok(vec![filter])
     }
 
     fn robust(&self) -> Filter {

@@ -25,6 +25,8 @@ pub struct PathResult {
     pub vertices_full: u32,
     /// How long the n-grams of the prior took to map.
     pub prior_time: Duration,
+    /// Whether a long search that starts at the true path ends in another map; `None` when there was no search.
+    pub limit: Option<bool>,
 }
 
 /// How right a map is after some places of the path.
@@ -92,7 +94,7 @@ pub fn judge(trial: &Trial, settings: &Settings, start: Start) -> PathResult {
         }
     }
     let vertices_full = candidate.vertices_full();
-    PathResult { exhaustive: trial.exhaustive, judgements, vertices_full, prior_time }
+    PathResult { exhaustive: trial.exhaustive, judgements, vertices_full, prior_time, limit: None }
 }
 
 fn graph_of(map: &Map<VERTICES>) -> Graph {
@@ -100,9 +102,12 @@ fn graph_of(map: &Map<VERTICES>) -> Graph {
     Graph::from_edges(usize::from(map.vertices()), edges)
 }
 
+/// The distance of a map after so many places of the path, in millimetres.
+type Distance<'a> = Box<dyn Fn(&Map<VERTICES>, usize) -> u16 + 'a>;
+
 /// The two-sided distance (Eq. 2) of a map from the n-grams of the prior, or, without one, from those of the first so
 /// many places of the path; in millimetres, whatever direction the filter takes.
-fn distance_mm<'a>(trial: &'a Trial, settings: &Settings) -> Box<dyn Fn(&Map<VERTICES>, usize) -> u16 + 'a> {
+fn distance_mm<'a>(trial: &'a Trial, settings: &Settings) -> Distance<'a> {
     let length = settings.ngram_length;
     let ngrams = match settings.prior {
         PriorSource::None if settings.longest() <= 256 => return from_history::<8>(trial, length),
@@ -111,16 +116,13 @@ fn distance_mm<'a>(trial: &'a Trial, settings: &Settings) -> Box<dyn Fn(&Map<VER
         PriorSource::Exploration => trial.ngrams.len(),
     };
     match ngrams {
-        ..=512 => from_prior::<32>(trial, settings),
-        ..=1024 => from_prior::<64>(trial, settings),
+        0..=512 => from_prior::<32>(trial, settings),
+        513..=1024 => from_prior::<64>(trial, settings),
         _ => from_prior::<512>(trial, settings),
     }
 }
 
-fn from_history<'a, const WORDS: usize>(
-    trial: &'a Trial,
-    length: NgramLength,
-) -> Box<dyn Fn(&Map<VERTICES>, usize) -> u16 + 'a> {
+fn from_history<'a, const WORDS: usize>(trial: &'a Trial, length: NgramLength) -> Distance<'a> {
     Box::new(move |map, steps| {
         let mut history = Box::new(History::<WORDS>::new());
         for visit in &trial.visits[..steps] {
@@ -130,10 +132,7 @@ fn from_history<'a, const WORDS: usize>(
     })
 }
 
-fn from_prior<const WORDS: usize>(
-    trial: &Trial,
-    settings: &Settings,
-) -> Box<dyn Fn(&Map<VERTICES>, usize) -> u16 + 'static> {
+fn from_prior<const WORDS: usize>(trial: &Trial, settings: &Settings) -> Distance<'static> {
     let (prior, length) = (prior_table::<WORDS>(settings, trial), settings.ngram_length);
     Box::new(move |map, _| two_sided_mm::<WORDS, 7>(map, prior.ngrams(), length))
 }
@@ -146,4 +145,105 @@ fn two_sided_mm<const WORDS: usize, const INDICES: usize>(
     let mut consistency = Box::new(Consistency::<VERTICES, WORDS, INDICES>::new());
     let steps = consistency.distance_steps(map, evidence, length, Direction::TwoSided);
     steps.map_or(u16::MAX, |steps| steps.saturating_mul(length.label_step_mm()))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::evaluation::{
+        candidate::Candidate,
+        environment::{Environment, Place},
+        run::Filter,
+        walk::all_walks,
+    };
+    use toposlam::{Fingerprint, Observation, RobustConfig};
+
+    /// A candidate that has the whole environment as its map from the start, and knows where the robot is but for the
+    /// first so many places.
+    struct Oracle {
+        map: Map<VERTICES>,
+        places: Vec<usize>,
+        seen: usize,
+        lost_for: usize,
+    }
+
+    impl Candidate for Oracle {
+        fn observe(&mut self, _: Observation) {
+            self.seen += 1;
+        }
+
+        fn map(&self) -> Map<VERTICES> {
+            self.map
+        }
+
+        fn path(&self, places: usize) -> Vec<usize> {
+            let vertex = |(step, &place)| if step < self.lost_for { (place + 1) % 3 } else { place };
+            let path: Vec<usize> = self.places[..self.seen].iter().enumerate().map(vertex).collect();
+            path[self.seen - places..].to_vec()
+        }
+
+        fn vertices_full(&self) -> u32 {
+            3
+        }
+    }
+
+    fn oracle<const LOST_FOR: usize>(_: &Settings, trial: &Trial) -> Box<dyn Candidate> {
+        let mut map = Map::new();
+        for place in trial.environment.places() {
+            map.add_vertex(Fingerprint::from_radius_mm(place.mean_mm as u16).unwrap()).unwrap();
+        }
+        trial.environment.graph().edges().iter().for_each(|&(a, b)| map.add_edge(a as u8, b as u8));
+        let places = trial.mapped_before().iter().flatten().chain(&trial.visits).map(|visit| visit.place).collect();
+        Box::new(Oracle { map, places, seen: 0, lost_for: LOST_FOR })
+    }
+
+    fn triangle() -> Environment {
+        let places = [800.0, 1600.0, 2400.0].iter().zip(0..).map(|(&mean_mm, id)| Place { id, mean_mm, sd_mm: 0.0 });
+        Environment::new("triangle".into(), places.collect(), &[[0, 1], [1, 2], [2, 0]]).unwrap()
+    }
+
+    fn judged(prior: PriorSource, lengths: &[usize], start: Start) -> PathResult {
+        let environment = triangle();
+        let settings = Settings {
+            paths: 1,
+            lengths: lengths.to_vec(),
+            seed: 1,
+            filter: Filter::Robust(RobustConfig::DEFAULT),
+            prior,
+            hints: Default::default(),
+            fingerprint_bits: 12,
+            ngram_length: NgramLength::new(3).unwrap(),
+            threads: 1,
+        };
+        let walks = all_walks(&environment, 3, 100).unwrap();
+        judge(&Trial::draw(&environment, &walks, &settings, 0), &settings, start)
+    }
+
+    #[test]
+    fn the_whole_environment_is_exact_at_once_when_it_was_explored() {
+        let result = judged(PriorSource::Exploration, &[1, 4, 30], oracle::<0>);
+        assert_eq!(result.vertices_full, 3);
+        for (judgement, exact_from) in result.judgements.iter().zip([1, 1, 1]) {
+            let right = MapScore { exact: true, isomorphic: true, edge_f1: 1.0, location: 1.0 };
+            assert_eq!(judgement.score, right);
+            assert_eq!((judgement.vertices, judgement.localised_share), (3, 1.0));
+            assert_eq!((judgement.exact_from, judgement.consistency_mm), (Some(exact_from), 0));
+        }
+    }
+
+    #[test]
+    fn without_a_prior_a_map_is_judged_by_what_was_traversed() {
+        let result = judged(PriorSource::None, &[1, 30], oracle::<0>);
+        let [first, last] = [&result.judgements[0], &result.judgements[1]];
+        assert!(!first.score.exact && last.score.exact);
+        assert_eq!((first.exact_from, last.exact_from), (None, Some(10)));
+    }
+
+    #[test]
+    fn a_robot_that_was_lost_for_a_while_is_located_online_once_most_visits_are_right() {
+        let result = judged(PriorSource::None, &[12, 60], oracle::<4>);
+        let [first, last] = [&result.judgements[0], &result.judgements[1]];
+        assert_eq!(last.score.location, 56.0 / 60.0);
+        assert!(first.localised_share < last.localised_share && last.localised_share < 1.0);
+    }
 }

@@ -166,6 +166,10 @@ pub struct Row {
     pub paths_not_exhaustive: usize,
     /// How often, up to the end of the paths, a filter wanted a vertex that its map had no room for.
     pub vertices_full: u64,
+    /// The share of paths for which a long search that starts at the true path ends in another map, so that no better
+    /// search for the same score finds the truth; absent without such a search.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub limit: Option<f64>,
     /// Wall-clock time to map the n-grams of the prior, in seconds a path, on one thread; differs from run to run.
     pub prior_seconds: f64,
     /// Wall-clock time of one filter update, in seconds, on one thread; differs from run to run.
@@ -228,6 +232,8 @@ fn row(case: &Case, settings: &Settings, results: &[PathResult], check_point: us
     let length = settings.lengths[check_point];
     let filter_time: Duration = judged().map(|judgement| judgement.filter_time).sum();
     let prior_time: Duration = results.iter().map(|result| result.prior_time).sum();
+    let limits: Vec<bool> = results.iter().filter_map(|result| result.limit).collect();
+    let limit = limits.iter().filter(|&&left_truth| left_truth).count() as f64 / limits.len() as f64;
     let missed = results.iter().filter(|result| !result.exhaustive).count();
     Row {
         name: case.name.clone(),
@@ -248,6 +254,7 @@ fn row(case: &Case, settings: &Settings, results: &[PathResult], check_point: us
         places_until_exact: Distribution::of_reached(judged().map(|judgement| judgement.exact_from)),
         paths_not_exhaustive: if settings.longest() >= EXHAUSTIVE_FROM_LENGTH { missed } else { 0 },
         vertices_full: results.iter().map(|result| u64::from(result.vertices_full)).sum(),
+        limit: (!limits.is_empty()).then_some(limit),
         prior_seconds: prior_time.as_secs_f64() / results.len() as f64,
         seconds_per_place: filter_time.as_secs_f64() / (results.len() * length) as f64,
     }
@@ -270,20 +277,22 @@ impl fmt::Display for Report {
         write!(f, "{:<width$} {:<7}{:>6}{:>6}{:>7} {:<12}", "name", "filter", "paths", "T", "exact", "95 %")?;
         writeln!(
             f,
-            "{:>6}{:>8}{:>8}{:>10}{:>13}{:>13}{:>10}  vertices: maps",
+            "{:>6}{:>9}{:>8}{:>10}{:>15}{:>14}{:>10}  vertices: maps",
             "iso", "edge F1", "online", "smoothed", "exact from", "d_H, mm", "ms/place"
         )?;
         for row in &self.rows {
             let [low, high] = row.exact_interval;
             let interval = format!("{low:.3}-{high:.3}");
             write!(f, "{:<width$} {:<7}{:>6}{:>6}", row.name, row.filter, row.paths, row.length)?;
-            write!(f, "{:>7.3} {interval:<12}{:>6.3}{:>8.3}", row.exact, row.isomorphic, row.edge_f1)?;
+            write!(f, "{:>7.3} {interval:<12}{:>6.3}{:>9.3}", row.exact, row.isomorphic, row.edge_f1)?;
             write!(f, "{:>8.3}{:>10.3}", row.location_online, row.location_smoothed)?;
             let Distribution { median, p90 } = row.places_until_exact;
             let place = |place: Option<usize>| place.map_or("never".to_owned(), |place| place.to_string());
-            write!(f, "{:>13}", format!("{} / {}", place(median), place(p90)))?;
+            write!(f, "{:>15}", format!("{} / {}", place(median), place(p90)))?;
             let Distribution { median, p90 } = row.consistency_mm;
-            write!(f, "{:>13}{:>10.3} ", format!("{median} / {p90}"), row.seconds_per_place * 1e3)?;
+            let distance = |mm: u16| if mm == u16::MAX { "inf".to_owned() } else { mm.to_string() };
+            let distances = format!("{} / {}", distance(median), distance(p90));
+            write!(f, "{distances:>14}{:>10.3} ", row.seconds_per_place * 1e3)?;
             row.vertices.iter().try_for_each(|(vertices, maps)| write!(f, " {vertices}:{maps}"))?;
             writeln!(f)?;
         }

@@ -15,8 +15,8 @@ pub(super) const MAX_PLACES: usize = 2048;
 
 pub(super) fn choose(particles: usize, settings: &Settings, ngrams: usize) -> Result<Start, EvaluationError> {
     match particles {
-        ..=10 => with_particles::<10>(settings, ngrams),
-        ..=32 => with_particles::<32>(settings, ngrams),
+        0..=10 => with_particles::<10>(settings, ngrams),
+        11..=32 => with_particles::<32>(settings, ngrams),
         _ => with_particles::<100>(settings, ngrams),
     }
 }
@@ -25,15 +25,15 @@ fn with_particles<const N: usize>(settings: &Settings, ngrams: usize) -> Result<
     if settings.prior == PriorSource::None {
         // A word of history holds 32 places.
         return match settings.longest() {
-            ..=256 => Ok(Online::<N, 8>::start),
-            ..=MAX_PLACES => Ok(Online::<N, 64>::start),
+            0..=256 => Ok(Online::<N, 8>::start),
+            257..=MAX_PLACES => Ok(Online::<N, 64>::start),
             _ => Err(EvaluationError::PathTooLong { most: MAX_PLACES }),
         };
     }
     // A word of a table holds 16 n-grams.
     match ngrams {
-        ..=512 => Ok(Informed::<N, 32>::start),
-        ..=1024 => Ok(Informed::<N, 64>::start),
+        0..=512 => Ok(Informed::<N, 32>::start),
+        513..=1024 => Ok(Informed::<N, 64>::start),
         _ => Ok(Informed::<N, 512>::start),
     }
 }

@@ -15,17 +15,17 @@ const MAX_HISTORY: usize = 16384;
 /// `places` is how many places the n-grams and the path have together.
 pub(super) fn choose(hypotheses: usize, places: usize) -> Result<Start, EvaluationError> {
     match hypotheses {
-        ..=10 => with_hypotheses::<10>(places),
-        ..=32 => with_hypotheses::<32>(places),
+        0..=10 => with_hypotheses::<10>(places),
+        11..=32 => with_hypotheses::<32>(places),
         _ => with_hypotheses::<100>(places),
     }
 }
 
 fn with_hypotheses<const N: usize>(places: usize) -> Result<Start, EvaluationError> {
     match places {
-        ..=512 => Ok(Robust::<N, 512>::start),
-        ..=4096 => Ok(Robust::<N, 4096>::start),
-        ..=MAX_HISTORY => Ok(Robust::<N, MAX_HISTORY>::start),
+        0..=512 => Ok(Robust::<N, 512>::start),
+        513..=4096 => Ok(Robust::<N, 4096>::start),
+        4097..=MAX_HISTORY => Ok(Robust::<N, MAX_HISTORY>::start),
         _ => Err(EvaluationError::PathTooLong { most: MAX_HISTORY }),
     }
 }
