@@ -1,6 +1,6 @@
 //! The environment graph: places with the statistics of their fingerprints, and the corridors between them.
 
-use super::graph::Graph;
+use super::graph::{Graph, first_unreached};
 use serde::Deserialize;
 use std::{collections::HashMap, fmt, fs, io, path::Path, str::FromStr};
 use toposlam::Fingerprint;
@@ -156,6 +156,17 @@ impl Environment {
         Ok(Self { name, places, graph, neighbours })
     }
 
+    /// The same corridors between other places: place `i` takes the label of place `labels[i]`, mean and deviation.
+    ///
+    /// # Panics
+    /// When `labels` does not name a place for each place.
+    pub fn with_labels_of(&self, labels: &[usize]) -> Self {
+        let relabelled = |(place, &from): (&Place, &usize)| Place { id: place.id, ..self.places[from] };
+        let places: Vec<Place> = self.places.iter().zip(labels).map(relabelled).collect();
+        assert_eq!(places.len(), self.places.len(), "every place has a label");
+        Self { places, ..self.clone() }
+    }
+
     /// The name that reports carry.
     pub fn name(&self) -> &str {
         &self.name
@@ -175,20 +186,6 @@ impl Environment {
     pub fn neighbours(&self) -> &[Vec<usize>] {
         &self.neighbours
     }
-}
-
-fn first_unreached(neighbours: &[Vec<usize>]) -> Option<usize> {
-    let mut reached = vec![false; neighbours.len()];
-    reached[0] = true;
-    let mut open = vec![0];
-    while let Some(place) = open.pop() {
-        for &next in &neighbours[place] {
-            if !std::mem::replace(&mut reached[next], true) {
-                open.push(next);
-            }
-        }
-    }
-    reached.iter().position(|&reached| !reached)
 }
 
 #[cfg(test)]

@@ -26,15 +26,23 @@ impl SmallestEquivalent {
         for step in walk.windows(2) {
             traversed.add_edge(step[0], step[1]);
         }
-        let visited: BTreeSet<usize> = walk.iter().copied().collect();
+        Self::of_part(environment, &traversed, &walk.iter().copied().collect())
+    }
+
+    /// The smallest equivalent of a whole environment.
+    pub fn of_environment(environment: &Environment) -> Self {
+        Self::of_part(environment, environment.graph(), &(0..environment.places().len()).collect())
+    }
+
+    fn of_part(environment: &Environment, traversed: &Graph, visited: &BTreeSet<usize>) -> Self {
         let neighbours = traversed.neighbours();
 
-        let mut classes = number(&visited, |place| {
+        let mut classes = number(visited, |place| {
             let label = environment.places()[place];
             (label.mean_mm.to_bits(), label.sd_mm.to_bits())
         });
         loop {
-            let refined = number(&visited, |place| {
+            let refined = number(visited, |place| {
                 let around: BTreeSet<usize> = neighbours[place].iter().map(|next| classes[next]).collect();
                 (classes[&place], around)
             });
@@ -107,6 +115,14 @@ mod tests {
         let smallest = SmallestEquivalent::of_traversed(&ring, &[0, 1, 2]);
         assert_eq!(smallest.graph, Graph::from_edges(2, [(0, 1)]));
         assert_eq!(smallest.class_of_place, [Some(0), Some(1), Some(0), None]);
+    }
+
+    #[test]
+    fn the_equivalent_of_a_whole_environment_is_that_of_an_exhaustive_walk() {
+        let ring = environment(&[900.0, 1500.0, 900.0, 2000.0], &[[0, 1], [1, 2], [2, 3], [3, 0]]);
+        let whole = SmallestEquivalent::of_environment(&ring);
+        assert_eq!(whole, SmallestEquivalent::of_traversed(&ring, &[0, 1, 2, 3, 0]));
+        assert_eq!(whole.graph.vertex_count(), 3);
     }
 
     #[test]

@@ -57,6 +57,11 @@ impl Graph {
         neighbours.into_iter().map(|set| set.into_iter().collect()).collect()
     }
 
+    /// Whether a walk leads from the first vertex to every other.
+    pub fn is_connected(&self) -> bool {
+        first_unreached(&self.neighbours()).is_none()
+    }
+
     /// Whether the vertices of the two graphs can be matched one to one so that the edges agree. Labels play no part.
     pub fn is_isomorphic_to(&self, other: &Self) -> bool {
         is_isomorphic(&self.to_petgraph(), &other.to_petgraph())
@@ -70,6 +75,18 @@ impl Graph {
         }
         graph
     }
+}
+
+/// The first vertex that no walk from vertex 0 leads to.
+pub(super) fn first_unreached(neighbours: &[Vec<usize>]) -> Option<usize> {
+    let mut reached = vec![false; neighbours.len()];
+    let mut open = vec![0];
+    while let Some(vertex) = open.pop() {
+        if !std::mem::replace(reached.get_mut(vertex)?, true) {
+            open.extend(&neighbours[vertex]);
+        }
+    }
+    reached.iter().position(|&reached| !reached)
 }
 
 #[cfg(test)]

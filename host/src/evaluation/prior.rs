@@ -1,15 +1,12 @@
 //! What the filter knows of the environment before it starts (Γ_env of the paper).
 
-use super::{
-    environment::Environment,
-    walk::{PathRng, observe},
-};
 use toposlam::{Fingerprint, History, Ngram, NgramLength, NgramsFull, Prior};
 
 /// Where the n-grams of the environment come from.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum PriorSource {
-    /// All n-grams of the very path that is mapped, derived before it starts: Section IV of the paper.
+    /// All n-grams of the very path that is mapped, derived before it starts: Section IV of the paper. The robust filter
+    /// gets every `n` successive places of the path.
     Path,
     /// One n-gram for every walk of `n` places of the whole environment, every reading drawn afresh: an earlier
     /// exploration that traversed every intersection from every direction.
@@ -55,22 +52,17 @@ pub fn path_prior<const V: usize, const WORDS: usize>(
     Ok(prior)
 }
 
-/// One n-gram for each walk, with a fresh reading at every place of every walk. Walks are given by the index of their
-/// places.
+/// A table of given n-grams; sequences of another length than `n` have no n-gram and are passed over.
 ///
 /// # Errors
 /// [`NgramsFull`] when there are more different n-grams than the prior holds.
-pub fn exploration_prior<const V: usize, const WORDS: usize>(
-    environment: &Environment,
-    walks: &[Vec<usize>],
+pub fn table_prior<const V: usize, const WORDS: usize>(
+    sequences: impl IntoIterator<Item = impl AsRef<[Fingerprint]>>,
     length: NgramLength,
-    rng: &mut PathRng,
 ) -> Result<Box<Prior<V, WORDS>>, NgramsFull> {
     let mut prior = Box::new(Prior::new(length));
-    for walk in walks {
-        let labels: Vec<_> = walk.iter().map(|&place| observe(&environment.places()[place], rng)).collect();
-        // A walk of another length than `n` has no n-gram.
-        if let Ok(ngram) = Ngram::new(length, &labels) {
+    for sequence in sequences {
+        if let Ok(ngram) = Ngram::new(length, sequence.as_ref()) {
             prior.insert(ngram)?;
         }
     }
@@ -80,7 +72,10 @@ pub fn exploration_prior<const V: usize, const WORDS: usize>(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::evaluation::walk::{all_walks, path_rng};
+    use crate::evaluation::{
+        environment::{Environment, Place},
+        walk::{PathRng, all_walks, observe, path_rng},
+    };
     use std::path::Path;
 
     #[test]
@@ -104,6 +99,11 @@ mod tests {
         }
     }
 
+    fn readings(environment: &Environment, walks: &[Vec<usize>], rng: &mut PathRng) -> Vec<Vec<Fingerprint>> {
+        let mut read = |walk: &Vec<usize>| walk.iter().map(|&at| observe(&environment.places()[at], rng)).collect();
+        walks.iter().map(&mut read).collect()
+    }
+
     fn shipped(name: &str) -> Environment {
         let path = Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("environments/{name}.toml"));
         Environment::load(&path).unwrap()
@@ -114,11 +114,11 @@ mod tests {
         let published = shipped("table-i");
         let edges = published.graph().edges().iter();
         let edges: Vec<_> = edges.map(|&(a, b)| [published.places()[a].id, published.places()[b].id]).collect();
-        let places = published.places().iter().map(|&place| super::super::environment::Place { sd_mm: 0.0, ..place });
+        let places = published.places().iter().map(|&place| Place { sd_mm: 0.0, ..place });
         let environment = Environment::new("table-i".into(), places.collect(), &edges).unwrap();
         let walks = all_walks(&environment, 3, usize::MAX).unwrap();
         let length = NgramLength::new(3).unwrap();
-        let prior = exploration_prior::<8, 8>(&environment, &walks, length, &mut path_rng(1, 0)).unwrap();
+        let prior = table_prior::<8, 8>(readings(&environment, &walks, &mut path_rng(1, 0)), length).unwrap();
         assert_eq!(prior.ngrams().len(), 24);
     }
 
@@ -128,8 +128,9 @@ mod tests {
         let walks = all_walks(&environment, 5, usize::MAX).unwrap();
         assert_eq!(walks.len(), 287);
         let length = NgramLength::new(5).unwrap();
-        let prior = exploration_prior::<8, 32>(&environment, &walks, length, &mut path_rng(1, 0)).unwrap();
+        let read = readings(&environment, &walks, &mut path_rng(1, 0));
+        let prior = table_prior::<8, 32>(&read, length).unwrap();
         assert_eq!(prior.ngrams().len(), 287);
-        assert!(exploration_prior::<8, 8>(&environment, &walks, length, &mut path_rng(1, 0)).is_err());
+        assert!(table_prior::<8, 8>(&read, length).is_err());
     }
 }

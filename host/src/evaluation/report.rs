@@ -1,82 +1,298 @@
 //! What an evaluation prints: the JSON object and the table.
 
+use super::{
+    case::Case,
+    judge::{Judgement, PathResult},
+    run::{Filter, Settings},
+    walk::EXHAUSTIVE_FROM_LENGTH,
+};
 use serde::Serialize;
-use std::{collections::BTreeMap, fmt};
+use std::{collections::BTreeMap, fmt, time::Duration};
+use toposlam::{Config, Direction, RobustConfig};
 
-/// The results for all environments of one run; serialises to the JSON object of `toposlam evaluate`.
+/// The width of a bin of [`Row::consistency_bins`], in millimetres.
+pub const BIN_MM: u16 = 20;
+
+/// The results of one run; serialises to the JSON object of `toposlam evaluate`.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Report {
-    /// One entry for each environment, in the order asked for.
-    pub environments: Vec<EnvironmentReport>,
+    /// What holds for all rows.
+    pub settings: SettingsReport,
+    /// One row for each case, filter and check point, in the order asked for.
+    pub rows: Vec<Row>,
 }
 
-/// The results for one environment. Shares lie between 0 and 1.
+/// The settings of a run.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct EnvironmentReport {
-    /// The name of the environment.
-    pub name: String,
-    /// The filter: `paper`.
-    pub filter: String,
-    /// Where the n-grams of the environment came from: `path`, `exploration` or `none`.
-    pub prior: String,
-    /// How many paths were drawn.
-    pub paths: usize,
-    /// How many places each path visits.
-    pub length: usize,
-    /// How many particles the filter draws.
-    pub particles: u8,
+pub struct SettingsReport {
     /// The seed of all paths.
     pub seed: u64,
-    /// The share of final maps that are exactly right.
+    /// Where the n-grams of the environment came from: `path`, `exploration` or `none`.
+    pub prior: String,
+    /// What the filter was told besides fingerprints, as on the command line.
+    pub hints: String,
+    /// How many bits a fingerprint has.
+    pub fingerprint_bits: u32,
+    /// `n`.
+    pub ngram_length: u8,
+    /// The parameters of the filters that ran, by their names.
+    pub filters: BTreeMap<&'static str, FilterReport>,
+}
+
+/// The parameters of one filter.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+#[serde(untagged)]
+pub enum FilterReport {
+    /// Those of the paper's filter.
+    Paper {
+        /// N.
+        hypotheses: u8,
+        /// phi of Eq. 9.
+        penalty: f64,
+        /// sigma_l of Eq. 7 and 9, in millimetres.
+        sigma_label_mm: u16,
+        /// sigma_c of Eq. 8, in millimetres.
+        sigma_consistency_mm: u16,
+        /// The direction of Eq. 2, as on the command line.
+        consistency: &'static str,
+    },
+    /// Those of the robust filter.
+    Robust {
+        /// How many hypotheses are kept.
+        hypotheses: u8,
+        /// The first guess at the standard deviation of a fingerprint, in millimetres.
+        noise_mm: u16,
+        /// How many repair moves are tried at each place.
+        moves: u8,
+        /// How often the filter takes a turn for wrong, 0 to 1.
+        wrong_turn: f64,
+        /// How often the filter takes a degree for wrong, 0 to 1.
+        wrong_degree: f64,
+    },
+}
+
+impl SettingsReport {
+    /// The settings of one or more evaluations that differ in their filter alone.
+    pub fn of(settings: &Settings, filters: &[Filter]) -> Self {
+        Self {
+            seed: settings.seed,
+            prior: settings.prior.name().into(),
+            hints: settings.hints.to_string(),
+            fingerprint_bits: settings.fingerprint_bits,
+            ngram_length: settings.ngram_length.get(),
+            filters: filters.iter().map(|&filter| (filter.name(), filter.into())).collect(),
+        }
+    }
+}
+
+impl From<Filter> for FilterReport {
+    fn from(filter: Filter) -> Self {
+        match filter {
+            Filter::Paper(Config {
+                particles,
+                penalty_permille,
+                sigma_label_mm,
+                sigma_consistency_mm,
+                direction,
+                ngram_length: _,
+            }) => Self::Paper {
+                hypotheses: particles,
+                penalty: f64::from(penalty_permille) / 1000.0,
+                sigma_label_mm,
+                sigma_consistency_mm,
+                consistency: match direction {
+                    Direction::TwoSided => "two-sided",
+                    Direction::MapToHistory => "map-to-history",
+                    Direction::HistoryToMap => "history-to-map",
+                },
+            },
+            Filter::Robust(RobustConfig {
+                hypotheses,
+                noise_mm,
+                moves,
+                wrong_turn_permille,
+                wrong_degree_permille,
+                ..
+            }) => Self::Robust {
+                hypotheses,
+                noise_mm,
+                moves,
+                wrong_turn: f64::from(wrong_turn_permille) / 1000.0,
+                wrong_degree: f64::from(wrong_degree_permille) / 1000.0,
+            },
+        }
+    }
+}
+
+/// The results of one filter in one case, judged at one check point. Shares lie between 0 and 1.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Row {
+    /// The name of the case: an environment, placements or a family.
+    pub name: String,
+    /// How many environments it has.
+    pub environments: usize,
+    /// The seed they were drawn with; `null` for an environment from a file.
+    pub environment_seed: Option<u64>,
+    /// The filter: `paper` or `robust`.
+    pub filter: &'static str,
+    /// How many paths were drawn.
+    pub paths: usize,
+    /// After how many places the map was judged.
+    pub length: usize,
+    /// The share of maps that are exactly right.
     pub exact: f64,
-    /// The share of final maps that are right but for their labels.
+    /// The 95 % confidence interval of [`Row::exact`] (Wilson), for paths that are independent of each other; where
+    /// several paths share a random environment it is too narrow for the class of environments.
+    pub exact_interval: [f64; 2],
+    /// The share of maps that are right but for their labels.
     pub isomorphic: f64,
-    /// How many of the final maps have this many vertices.
+    /// How many of the maps have this many vertices (the paper's Fig. 5).
     pub vertices: BTreeMap<usize, usize>,
-    /// The mean over paths of [`MapScore::edge_f1`](super::score::MapScore::edge_f1) of the final map.
+    /// The mean over paths of [`MapScore::edge_f1`](super::score::MapScore::edge_f1).
     pub edge_f1: f64,
-    /// The share of steps at which the best hypothesis of that moment knew where the robot was.
+    /// The share of places at which the best hypothesis of that moment knew where the robot was.
     pub location_online: f64,
-    /// The share of steps at which the path of the final map is right.
+    /// The share of places at which the path of the map at the check point is right.
     pub location_smoothed: f64,
-    /// The two-sided distance (Eq. 2) of the final map from the n-grams of the environment.
-    pub consistency_mm: Distribution,
-    /// Wall-clock time of one filter update, in seconds, on one thread. The only entry that differs from run to run.
+    /// The two-sided distance (Eq. 2) of the map from the n-grams of the environment.
+    pub consistency_mm: Distribution<u16>,
+    /// How many of the maps have a distance from this many millimetres up to 20 more (the paper's Fig. 4); an infinite
+    /// one is in bin 65520.
+    pub consistency_bins: BTreeMap<u16, usize>,
+    /// The place from which on the map was exact, up to the check point; looked at after every tenth place. Over all
+    /// paths: `null` where the map of that path is not exact.
+    pub places_until_exact: Distribution<Option<usize>>,
+    /// How many paths do not traverse every edge although their whole length asks for it.
+    pub paths_not_exhaustive: usize,
+    /// How often, up to the end of the paths, a filter wanted a vertex that its map had no room for.
+    pub vertices_full: u64,
+    /// The share of paths for which a long search that starts at the true path ends in another map, so that no better
+    /// search for the same score finds the truth; absent without such a search.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub limit: Option<f64>,
+    /// Wall-clock time to map the n-grams of the prior, in seconds a path, on one thread; differs from run to run.
+    pub prior_seconds: f64,
+    /// Wall-clock time of one filter update, in seconds, on one thread; differs from run to run.
     pub seconds_per_place: f64,
 }
 
 /// Two points of a distribution over paths, each a value that occurred (nearest rank).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
-pub struct Distribution {
+pub struct Distribution<T> {
     /// Half of the values are not larger.
-    pub median: u16,
+    pub median: T,
     /// Nine tenths of the values are not larger.
-    pub p90: u16,
+    pub p90: T,
 }
 
-impl Distribution {
-    /// The distribution of some values; all zero without values.
-    pub fn of(mut values: Vec<u16>) -> Self {
+impl<T: Ord + Copy + Default> Distribution<T> {
+    /// The distribution of some values; the default without values.
+    pub fn of(mut values: Vec<T>) -> Self {
         values.sort_unstable();
         let rank = |percent: usize| (values.len() * percent).div_ceil(100).saturating_sub(1);
-        let at = |percent| values.get(rank(percent)).copied().unwrap_or(0);
+        let at = |percent| values.get(rank(percent)).copied().unwrap_or_default();
         Self { median: at(50), p90: at(90) }
+    }
+}
+
+impl Distribution<Option<usize>> {
+    /// As [`Distribution::of`], with `None` for what lies beyond every number.
+    fn of_reached(values: impl Iterator<Item = Option<usize>>) -> Self {
+        let Distribution { median, p90 } = Distribution::of(values.map(|value| value.unwrap_or(usize::MAX)).collect());
+        let reached = |value| Some(value).filter(|&value| value != usize::MAX);
+        Self { median: reached(median), p90: reached(p90) }
+    }
+}
+
+/// The 95 % confidence interval of a share after Wilson.
+fn wilson(share: f64, count: usize) -> [f64; 2] {
+    const Z: f64 = 1.959_964;
+    let count = count as f64;
+    let middle = share + Z * Z / (2.0 * count);
+    let half = Z * (share * (1.0 - share) / count + Z * Z / (4.0 * count * count)).sqrt();
+    let scale = 1.0 + Z * Z / count;
+    [((middle - half) / scale).max(0.0), ((middle + half) / scale).min(1.0)]
+}
+
+/// Sums up the paths of a case, a row for each check point.
+pub(super) fn rows(case: &Case, settings: &Settings, results: &[PathResult]) -> Vec<Row> {
+    (0..settings.lengths.len()).map(|check_point| row(case, settings, results, check_point)).collect()
+}
+
+fn row(case: &Case, settings: &Settings, results: &[PathResult], check_point: usize) -> Row {
+    let judged = || results.iter().map(|result| &result.judgements[check_point]);
+    let mean = |value: fn(&Judgement) -> f64| judged().map(value).sum::<f64>() / results.len() as f64;
+    let mut vertices = BTreeMap::new();
+    let mut consistency_bins = BTreeMap::new();
+    for judgement in judged() {
+        *vertices.entry(judgement.vertices).or_insert(0) += 1;
+        *consistency_bins.entry(judgement.consistency_mm / BIN_MM * BIN_MM).or_insert(0) += 1;
+    }
+    let exact = mean(|judgement| f64::from(u8::from(judgement.score.exact)));
+    let length = settings.lengths[check_point];
+    let filter_time: Duration = judged().map(|judgement| judgement.filter_time).sum();
+    let prior_time: Duration = results.iter().map(|result| result.prior_time).sum();
+    let limits: Vec<bool> = results.iter().filter_map(|result| result.limit).collect();
+    let limit = limits.iter().filter(|&&left_truth| left_truth).count() as f64 / limits.len() as f64;
+    let missed = results.iter().filter(|result| !result.exhaustive).count();
+    Row {
+        name: case.name.clone(),
+        environments: case.environments.len(),
+        environment_seed: case.environment_seed,
+        filter: settings.filter.name(),
+        paths: settings.paths,
+        length,
+        exact,
+        exact_interval: wilson(exact, results.len()),
+        isomorphic: mean(|judgement| f64::from(u8::from(judgement.score.isomorphic))),
+        vertices,
+        edge_f1: mean(|judgement| judgement.score.edge_f1),
+        location_online: mean(|judgement| judgement.localised_share),
+        location_smoothed: mean(|judgement| judgement.score.location),
+        consistency_mm: Distribution::of(judged().map(|judgement| judgement.consistency_mm).collect()),
+        consistency_bins,
+        places_until_exact: Distribution::of_reached(judged().map(|judgement| judgement.exact_from)),
+        paths_not_exhaustive: if settings.longest() >= EXHAUSTIVE_FROM_LENGTH { missed } else { 0 },
+        vertices_full: results.iter().map(|result| u64::from(result.vertices_full)).sum(),
+        limit: (!limits.is_empty()).then_some(limit),
+        prior_seconds: prior_time.as_secs_f64() / results.len() as f64,
+        seconds_per_place: filter_time.as_secs_f64() / (results.len() * length) as f64,
     }
 }
 
 impl fmt::Display for Report {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let header = ["exact", "isomorphic", "edge F1", "online", "smoothed", "median mm", "p90 mm", "ms/place"];
-        write!(f, "{:<24}{:<13}", "environment", "prior")?;
-        header.iter().try_for_each(|title| write!(f, "{title:>11}"))?;
-        writeln!(f, "  vertices: maps")?;
-        for row in &self.environments {
-            write!(f, "{:<24}{:<13}", row.name, row.prior)?;
-            for share in [row.exact, row.isomorphic, row.edge_f1, row.location_online, row.location_smoothed] {
-                write!(f, "{share:>11.3}")?;
+        let SettingsReport { seed, prior, hints, fingerprint_bits, ngram_length, filters } = &self.settings;
+        write!(f, "seed {seed}, prior {prior}, hints {hints}, {fingerprint_bits} bits, n = {ngram_length}")?;
+        for (name, filter) in filters {
+            // The parameters by the names they have in JSON.
+            let parameters = serde_json::to_value(filter).map_err(|_| fmt::Error)?;
+            write!(f, "; {name}:")?;
+            for (parameter, value) in parameters.as_object().into_iter().flatten() {
+                write!(f, " {parameter} {}", value.as_str().map_or(value.to_string(), str::to_owned))?;
             }
-            write!(f, "{:>11}{:>11}", row.consistency_mm.median, row.consistency_mm.p90)?;
-            write!(f, "{:>11.3} ", row.seconds_per_place * 1e3)?;
+        }
+        writeln!(f)?;
+        let width = self.rows.iter().map(|row| row.name.chars().count()).max().unwrap_or(0).max("name".len());
+        write!(f, "{:<width$} {:<7}{:>6}{:>6}{:>7} {:<12}", "name", "filter", "paths", "T", "exact", "95 %")?;
+        writeln!(
+            f,
+            "{:>6}{:>9}{:>8}{:>10}{:>15}{:>14}{:>10}  vertices: maps",
+            "iso", "edge F1", "online", "smoothed", "exact from", "d_H, mm", "ms/place"
+        )?;
+        for row in &self.rows {
+            let [low, high] = row.exact_interval;
+            let interval = format!("{low:.3}-{high:.3}");
+            write!(f, "{:<width$} {:<7}{:>6}{:>6}", row.name, row.filter, row.paths, row.length)?;
+            write!(f, "{:>7.3} {interval:<12}{:>6.3}{:>9.3}", row.exact, row.isomorphic, row.edge_f1)?;
+            write!(f, "{:>8.3}{:>10.3}", row.location_online, row.location_smoothed)?;
+            let Distribution { median, p90 } = row.places_until_exact;
+            let place = |place: Option<usize>| place.map_or("never".to_owned(), |place| place.to_string());
+            write!(f, "{:>15}", format!("{} / {}", place(median), place(p90)))?;
+            let Distribution { median, p90 } = row.consistency_mm;
+            let distance = |mm: u16| if mm == u16::MAX { "inf".to_owned() } else { mm.to_string() };
+            let distances = format!("{} / {}", distance(median), distance(p90));
+            write!(f, "{distances:>14}{:>10.3} ", row.seconds_per_place * 1e3)?;
             row.vertices.iter().try_for_each(|(vertices, maps)| write!(f, " {vertices}:{maps}"))?;
             writeln!(f)?;
         }
@@ -90,8 +306,23 @@ mod tests {
 
     #[test]
     fn the_points_of_a_distribution_are_nearest_ranks() {
-        assert_eq!(Distribution::of((1..=10).rev().collect()), Distribution { median: 5, p90: 9 });
-        assert_eq!(Distribution::of(vec![7]), Distribution { median: 7, p90: 7 });
-        assert_eq!(Distribution::of(vec![]), Distribution::default());
+        assert_eq!(Distribution::of((1_u16..=10).rev().collect()), Distribution { median: 5, p90: 9 });
+        assert_eq!(Distribution::of(vec![7_u16]), Distribution { median: 7, p90: 7 });
+        assert_eq!(Distribution::of(Vec::<u16>::new()), Distribution::default());
+    }
+
+    #[test]
+    fn maps_that_never_become_exact_come_last() {
+        let values = [None, Some(30), Some(10), Some(20)];
+        assert_eq!(Distribution::of_reached(values.into_iter()), Distribution { median: Some(20), p90: None });
+    }
+
+    #[test]
+    fn the_interval_of_a_share_is_that_of_wilson() {
+        // Published values for 0 of 10, 8 of 10 and 10 of 10.
+        for (hits, low, high) in [(0.0, 0.0, 0.2775), (8.0, 0.4902, 0.9433), (10.0, 0.7225, 1.0)] {
+            let [least, most] = wilson(hits / 10.0, 10);
+            assert!((least - low).abs() < 1e-4 && (most - high).abs() < 1e-4, "{least} {most}");
+        }
     }
 }

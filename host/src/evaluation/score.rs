@@ -25,6 +25,15 @@ pub struct MapScore {
 /// # Panics
 /// When the path visits a vertex that the map does not have, or a class that the truth does not have.
 pub fn score_map(map: &Graph, path: &[usize], truth: &Graph, classes: &[usize]) -> MapScore {
+    score_map_from(map, path, truth, classes, 0)
+}
+
+/// As [`score_map`], but the location is judged from step `first` on; the steps before only tell what the vertices stand
+/// for.
+///
+/// # Panics
+/// As [`score_map`].
+pub fn score_map_from(map: &Graph, path: &[usize], truth: &Graph, classes: &[usize], first: usize) -> MapScore {
     let class_of_vertex = majority_classes(map.vertex_count(), truth.vertex_count(), path, classes);
     // The image of the map's edges. A vertex that was never visited stands for nothing.
     let image: BTreeSet<(usize, usize)> = map
@@ -38,12 +47,14 @@ pub fn score_map(map: &Graph, path: &[usize], truth: &Graph, classes: &[usize]) 
     let one_to_one = map.vertex_count() == truth.vertex_count() && hit.len() == truth.vertex_count();
     let common = image.intersection(truth.edges()).count();
     let pairs = image.len() + truth.edges().len();
-    let right = path.iter().zip(classes).filter(|&(&vertex, &class)| class_of_vertex[vertex] == Some(class)).count();
+    let judged = path.iter().zip(classes).skip(first);
+    let steps = judged.len();
+    let right = judged.filter(|&(&vertex, &class)| class_of_vertex[vertex] == Some(class)).count();
     MapScore {
         exact: one_to_one && image == *truth.edges(),
         isomorphic: map.is_isomorphic_to(truth),
         edge_f1: if pairs == 0 { 1.0 } else { 2.0 * common as f64 / pairs as f64 },
-        location: if path.is_empty() { 0.0 } else { right as f64 / path.len() as f64 },
+        location: if steps == 0 { 0.0 } else { right as f64 / steps as f64 },
     }
 }
 
@@ -126,6 +137,12 @@ mod tests {
         let score = score_map(&map, &[0, 1, 2, 2, 2, 3, 1, 2], &truth(), &CLASSES);
         assert!(!score.exact);
         assert_eq!(score.location, 7.0 / 8.0);
+    }
+
+    #[test]
+    fn steps_before_the_first_judged_one_match_vertices_but_are_not_located() {
+        let score = score_map_from(&truth(), &[0, 1, 2, 3, 2, 0, 1, 1], &truth(), &CLASSES, 6);
+        assert_eq!(score, MapScore { exact: true, isomorphic: true, edge_f1: 1.0, location: 1.0 / 2.0 });
     }
 
     #[test]

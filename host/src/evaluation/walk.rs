@@ -72,6 +72,18 @@ pub fn observe(place: &Place, rng: &mut PathRng) -> Fingerprint {
     Fingerprint::from_steps(steps.round() as u16).unwrap_or(Fingerprint::MAX)
 }
 
+/// A fingerprint as a sensor of `bits` bits would give it: the nearest of 2^`bits` levels from 0 to 8188 mm. From 12 bits
+/// on nothing changes.
+pub fn quantise(fingerprint: Fingerprint, bits: u32) -> Fingerprint {
+    if bits >= Fingerprint::BITS {
+        return fingerprint;
+    }
+    let (levels, most) = ((1_u32 << bits) - 1, u32::from(Fingerprint::MAX.steps()));
+    let level = (u32::from(fingerprint.steps()) * levels + most / 2) / most;
+    let steps = (level * most + levels / 2) / levels.max(1);
+    Fingerprint::from_steps(steps as u16).unwrap_or(Fingerprint::MAX)
+}
+
 /// Every walk of `length` places of the environment, a walk and its reversal counted once, in ascending order.
 ///
 /// `None` when there are more than `limit`.
@@ -154,6 +166,23 @@ mod tests {
             .collect();
         assert_eq!(readings.iter().min().map(|reading| reading.radius_mm()), Some(0));
         assert_eq!(readings.iter().max(), Some(&Fingerprint::MAX));
+    }
+
+    #[test]
+    fn quantised_fingerprints_are_the_nearest_of_equal_levels() {
+        for (bits, levels) in [(6, 64), (8, 256), (12, 4095)] {
+            let all = (0..=4094).map(|steps| Fingerprint::from_steps(steps).unwrap());
+            let mut held = BTreeSet::new();
+            for fingerprint in all {
+                let level = quantise(fingerprint, bits);
+                // Half of a level and the rounding to a step.
+                assert!(fingerprint.distance_steps(level) <= 4094 / (1 << bits) / 2 + 1, "{bits}: {fingerprint:?}");
+                assert_eq!(quantise(level, bits), level);
+                held.insert(level);
+            }
+            assert_eq!(held.len(), levels);
+            assert_eq!((held.first(), held.last()), (Some(&Fingerprint::ZERO), Some(&Fingerprint::MAX)));
+        }
     }
 
     #[test]
