@@ -144,7 +144,8 @@ pub mod wire;
 pub use consistency::{Consistency, Direction, Evidence};
 pub use fault::{FaultCounters, FaultKind};
 pub use filter::{
-    Config, ConfigError, PaperFilter, Particle, Prior, RobustConfig, RobustFilter, Update, WeightFactors,
+    Config, ConfigError, Filter, FilterCapacities, PaperFilter, Particle, Prior, RobustConfig, RobustFilter, Update,
+    WeightFactors, WorstNgram,
 };
 pub use fingerprint::{Fingerprint, FingerprintError};
 pub use history::History;
