@@ -155,3 +155,47 @@ impl<const N: usize, const V: usize, const WORDS: usize> Filter<V> for PaperFilt
         WorstNgram { distance_mm: self.best().consistency_mm, ..WorstNgram::NONE }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::Fingerprint;
+
+    /// After radii in millimetres, places of 1.2 m and 2.2 m being far apart.
+    fn after<F: Filter<4>>(config: F::Config, radii_mm: &[u16]) -> F {
+        let mut filter = F::UNSTARTED;
+        filter.start(config, 1).unwrap();
+        for &radius_mm in radii_mm {
+            filter.observe(Observation::new(Fingerprint::from_radius_mm(radius_mm).unwrap()));
+        }
+        filter
+    }
+
+    type Paper = PaperFilter<10, 4, 1>;
+
+    #[test]
+    fn the_paper_s_filter_is_certain_of_its_place_and_trusts_its_map_by_its_draws() {
+        let filter: Paper = after(Config::DEFAULT, &[]);
+        assert_eq!((filter.place_probability_q16(0), Filter::map_probability_q16(&filter)), (0, 0));
+        let filter: Paper = after(Config::DEFAULT, &[1200, 2200, 1200, 2200]);
+        let place = filter.best().place;
+        for vertex in 0..4 {
+            assert_eq!(filter.place_probability_q16(vertex), if vertex == place { 1 << 16 } else { 0 });
+            let has_it = vertex < filter.best().map.vertices();
+            assert_eq!(Filter::renamed(&filter, vertex), has_it.then_some(vertex));
+        }
+        let share = (u32::from(filter.best().multiplicity) << 16) / 10;
+        assert_eq!(filter.map_probability_q16(), share);
+        assert_eq!(filter.worst(), WorstNgram { distance_mm: filter.best().consistency_mm, ..WorstNgram::NONE });
+    }
+
+    #[test]
+    fn capacities_follow_the_settings() {
+        let config = Config { particles: 3, ngram_length: 4, ..Config::DEFAULT };
+        let expected = FilterCapacities { hypotheses: 3, history: 32, ngram_length: 4 };
+        assert_eq!(Paper::capacities(&config), expected);
+        let config = RobustConfig { hypotheses: 6, ..RobustConfig::DEFAULT };
+        let capacities = RobustFilter::<10, 4, 50>::capacities(&config);
+        assert_eq!((capacities.hypotheses, capacities.history), (6, 50));
+    }
+}
