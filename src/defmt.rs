@@ -8,8 +8,8 @@ use crate::place::{Place, PlaceConfigError};
 use crate::ring::Echo;
 use crate::sonar::{BridgeError, SonarError, SonarFault, Srf08ConfigError};
 use crate::{
-    ConfigError, FaultCounters, FaultKind, Fingerprint, FingerprintError, NgramError, NgramsFull, Update, VerticesFull,
-    WeightFactors,
+    ConfigError, FaultCounters, FaultKind, Fingerprint, FingerprintError, NgramError, NgramsFull, Observation, Turn,
+    Update, VerticesFull, WeightFactors, WorstNgram,
 };
 
 /// A text for each variant of an enum without fields.
@@ -34,6 +34,11 @@ texts!(FaultKind {
     HistoryFull => "HistoryFull",
     WireFull => "WireFull",
     WireCorrupt => "WireCorrupt",
+});
+
+texts!(Turn {
+    Back => "back",
+    On => "on",
 });
 
 texts!(PlaceConfigError {
@@ -104,6 +109,20 @@ impl Format for Place {
         let Self { fingerprint, frame_index, degree, spread_mm } = self;
         write!(f, "place of {} in frame {=u32}, degree {}", fingerprint, frame_index, degree);
         write!(f, ", spread {=u16} mm", spread_mm);
+    }
+}
+
+impl Format for Observation {
+    fn format(&self, f: Formatter<'_>) {
+        let Self { fingerprint, turn, degree, begins } = self;
+        write!(f, "{}, turn {}, degree {}, begins a sequence: {=bool}", fingerprint, turn, degree, begins);
+    }
+}
+
+impl Format for WorstNgram {
+    fn format(&self, f: Formatter<'_>) {
+        let Self { distance_mm, newest_age, .. } = self;
+        write!(f, "{=u16} mm from the walk {=[u8]}, {=u16} places ago", distance_mm, self.walk(), newest_age);
     }
 }
 

@@ -48,7 +48,8 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 //!
-//! With the feature `wire`, `Mapper` is these stages and the sender of the serial protocol in one piece.
+//! With the feature `wire`, `Mapper` is these stages and the sender of the serial protocol in one piece. It takes either
+//! filter, or another one that is a [`Filter`].
 //!
 //! # How well a map fits
 //!
@@ -113,8 +114,8 @@
 //! | Eq. 1, labels | `fingerprint.rs`, as running means `map.rs` |
 //! | Definitions 3 to 5, n-grams | `ngram/mod.rs`, `ngram/table.rs` |
 //! | Definition 6, Eq. 2 and 3, consistency | `consistency/` |
-//! | Eq. 4 and 5, the filter's step | `filter/selection.rs`, `filter/resample.rs` |
-//! | Eq. 6, the weight | `filter/particle.rs` |
+//! | Eq. 4 and 5, the filter's step | `filter/paper/selection.rs`, `filter/paper/resample.rs` |
+//! | Eq. 6, the weight | `filter/paper/particle.rs` |
 //! | Eq. 7 to 9, its factors | `likelihood.rs` |
 //! | Section III.B, localisation | `filter/mod.rs` ([`Update::vertex`]) |
 //! | Section IV.A, meet points | `place/` |
@@ -144,7 +145,8 @@ pub mod wire;
 pub use consistency::{Consistency, Direction, Evidence};
 pub use fault::{FaultCounters, FaultKind};
 pub use filter::{
-    Config, ConfigError, PaperFilter, Particle, Prior, RobustConfig, RobustFilter, Update, WeightFactors,
+    Config, ConfigError, Filter, FilterCapacities, PaperFilter, Particle, Prior, RobustConfig, RobustFilter, Update,
+    WeightFactors, WorstNgram,
 };
 pub use fingerprint::{Fingerprint, FingerprintError};
 pub use history::History;

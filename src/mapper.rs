@@ -3,21 +3,21 @@
 use crate::place::{Place, PlaceConfig, PlaceConfigError, PlaceDetector};
 use crate::ring::{RingFrame, RingGeometry};
 use crate::wire::{Capacities, Hello, Message, QueueFull, Reporter};
-use crate::{Config, ConfigError, FaultCounters, Fingerprint, Map, PaperFilter, Update};
+use crate::{ConfigError, FaultCounters, Filter, Fingerprint, Map, Observation, Turn, Update};
 use core::fmt;
 
 /// How often the robot introduces itself, in ring frames.
 const FRAMES_PER_HELLO: u16 = 100;
 
-/// The settings of every stage.
+/// The settings of every stage; `C` are those of the filter.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct MapperConfig<const SONARS: usize> {
+pub struct MapperConfig<const SONARS: usize, C> {
     /// Where the sonars look.
     pub geometry: RingGeometry<SONARS>,
     /// The place detector.
     pub place: PlaceConfig,
     /// The filter.
-    pub filter: Config,
+    pub filter: C,
     /// The seed of the filter's random draws.
     pub seed: u64,
     /// A number that differs from one start of the robot to the next; 0 when it has none.
@@ -25,34 +25,35 @@ pub struct MapperConfig<const SONARS: usize> {
 }
 
 /// The stages from the ring frame to the messages of the wire, in one piece of fixed memory: a ring of `SONARS`, and a
-/// filter of `N` particles with maps of `V` vertices and `32 · WORDS` places of history.
+/// filter with maps of `V` vertices.
 ///
 /// The firmware and a simulation on a host run this same code, and the same frames give the same messages.
 #[derive(Clone, Debug)]
-pub struct Mapper<const SONARS: usize, const N: usize, const V: usize, const WORDS: usize> {
+pub struct Mapper<const SONARS: usize, const V: usize, F> {
     detector: PlaceDetector<SONARS>,
-    filter: PaperFilter<N, V, WORDS>,
+    filter: F,
     reporter: Reporter<V>,
 }
 
-impl<const SONARS: usize, const N: usize, const V: usize, const WORDS: usize> Mapper<SONARS, N, V, WORDS> {
-    /// A mapper that waits for [`Mapper::start`]; all zero, so that a `static` of it lies in `.bss`.
+impl<const SONARS: usize, const V: usize, F: Filter<V>> Mapper<SONARS, V, F> {
+    /// A mapper that waits for [`Mapper::start`].
     pub const fn new() -> Self {
-        Self { detector: PlaceDetector::new(), filter: PaperFilter::new(), reporter: Reporter::new() }
+        Self { detector: PlaceDetector::new(), filter: F::UNSTARTED, reporter: Reporter::new() }
     }
 
     /// Forgets everything and starts anew.
     ///
     /// # Errors
     /// [`MapperError`] names the first setting that is out of its range; the mapper must then be started again.
-    pub fn start(&mut self, config: &MapperConfig<SONARS>) -> Result<(), MapperError> {
+    pub fn start(&mut self, config: &MapperConfig<SONARS, F::Config>) -> Result<(), MapperError> {
         self.detector.start(config.place, config.geometry).map_err(MapperError::Place)?;
         self.filter.start(config.filter, config.seed).map_err(MapperError::Filter)?;
+        let filter = F::capacities(&config.filter);
         let capacities = Capacities {
             vertices: V as u8,
-            hypotheses: config.filter.particles.into(),
-            history: (32 * WORDS) as u16,
-            ngram_length: config.filter.ngram_length,
+            hypotheses: filter.hypotheses,
+            history: filter.history,
+            ngram_length: filter.ngram_length,
             fingerprint_step_mm: Fingerprint::STEP_MM as u8,
             sonars: SONARS as u8,
         };
@@ -60,16 +61,21 @@ impl<const SONARS: usize, const N: usize, const V: usize, const WORDS: usize> Ma
         Ok(())
     }
 
-    /// Takes one frame of the ring; gives the place and the update when the robot has just been at one. `sonar_faults`
-    /// are those of the ring's driver so far. Every message goes to `send`, which says whether the transmit queue took it.
+    /// Takes one frame of the ring; gives the place and the update when the robot has just been at one.
+    ///
+    /// `turn` is what the drive knows of how the robot left the place before the one it may be at, `None` if nothing.
+    /// `sonar_faults` are those of the ring's driver so far. Every message goes to `send`, which says whether the transmit
+    /// queue took it.
     pub fn observe(
         &mut self,
         frame: &RingFrame<SONARS>,
+        turn: Option<Turn>,
         sonar_faults: &FaultCounters,
         mut send: impl FnMut(&Message) -> Result<(), QueueFull>,
     ) -> Option<(Place, Update)> {
         let seen = self.detector.observe(frame).map(|place| {
-            let update = self.filter.observe(place.fingerprint);
+            let Place { fingerprint, degree, .. } = place;
+            let update = self.filter.observe(Observation { turn, degree, ..Observation::new(fingerprint) });
             // A place is no state: one that the queue refuses is missing in the listener's log, and in nothing else.
             let _ = send(&Message::Place {
                 place_index: update.place_index,
@@ -77,7 +83,7 @@ impl<const SONARS: usize, const N: usize, const V: usize, const WORDS: usize> Ma
                 radius_mm: place.fingerprint.radius_mm(),
                 degree: place.degree,
             });
-            self.reporter.update(self.filter.map(), &update, &mut send);
+            self.reporter.update(&self.filter, &update, &mut send);
             (place, update)
         });
         let mut faults = *sonar_faults;
@@ -93,7 +99,7 @@ impl<const SONARS: usize, const N: usize, const V: usize, const WORDS: usize> Ma
     }
 
     /// The filter with all its hypotheses.
-    pub fn filter(&self) -> &PaperFilter<N, V, WORDS> {
+    pub fn filter(&self) -> &F {
         &self.filter
     }
 
@@ -103,7 +109,7 @@ impl<const SONARS: usize, const N: usize, const V: usize, const WORDS: usize> Ma
     }
 }
 
-impl<const SONARS: usize, const N: usize, const V: usize, const WORDS: usize> Default for Mapper<SONARS, N, V, WORDS> {
+impl<const SONARS: usize, const V: usize, F: Filter<V>> Default for Mapper<SONARS, V, F> {
     fn default() -> Self {
         Self::new()
     }

@@ -2,18 +2,21 @@
 //!
 //! A host that feeds the same frames into the same stages gets the same map, bit for bit.
 
-use crate::{Config, Direction, PaperFilter, place::PlaceConfig, place::PlaceDetector, ring::RingGeometry};
+use crate::{
+    Config, Direction, PaperFilter, RobustConfig, RobustFilter, place::PlaceConfig, place::PlaceDetector,
+    ring::RingGeometry,
+};
 #[cfg(feature = "wire")]
 use crate::{Mapper, MapperConfig};
 
 /// Sonars in the ring.
 pub const SONARS: usize = 16;
-/// The most particles.
-pub const PARTICLES: usize = 10;
+/// The most hypotheses.
+pub const HYPOTHESES: usize = 10;
 /// The most vertices of a map.
 pub const VERTICES: usize = 16;
-/// Words of the history: 32 observations each, so 256.
-pub const HISTORY_WORDS: usize = 8;
+/// The most observations in the history.
+pub const HISTORY: usize = 400;
 /// The seed of the filter's draws.
 pub const SEED: u64 = 1;
 
@@ -21,18 +24,28 @@ pub const SEED: u64 = 1;
 pub const RING: RingGeometry<SONARS> = RingGeometry::even();
 /// The detector's settings.
 pub const PLACE: PlaceConfig = PlaceConfig::DEFAULT;
-/// The filter's settings: the defaults, with the half of Eq. 2 that asks whether the map explains what was observed. On line
-/// the other half blames the map for what the robot has not driven yet, and costs several times as much (`docs/costs.md`).
-pub const FILTER: Config = Config { direction: Direction::HistoryToMap, ..Config::DEFAULT };
+/// The filter's settings.
+pub const FILTER: RobustConfig = RobustConfig::DEFAULT;
 
 /// The detector of the reference robot.
 pub type Detector = PlaceDetector<SONARS>;
 /// The filter of the reference robot.
-pub type Filter = PaperFilter<PARTICLES, VERTICES, HISTORY_WORDS>;
+pub type Filter = RobustFilter<HYPOTHESES, VERTICES, HISTORY>;
 /// All stages of the reference robot in one.
 #[cfg(feature = "wire")]
-pub type RobotMapper = Mapper<SONARS, PARTICLES, VERTICES, HISTORY_WORDS>;
+pub type RobotMapper = Mapper<SONARS, VERTICES, Filter>;
 /// The settings of all stages of the reference robot.
 #[cfg(feature = "wire")]
-pub const MAPPER: MapperConfig<SONARS> =
+pub const MAPPER: MapperConfig<SONARS, RobustConfig> =
     MapperConfig { geometry: RING, place: PLACE, filter: FILTER, seed: SEED, boot: 0 };
+
+/// The most particles of the paper's filter, where it stands in for the reference robot's.
+pub const PAPER_PARTICLES: usize = 10;
+/// Words of its history: 32 observations each, so 256.
+pub const PAPER_HISTORY_WORDS: usize = 8;
+/// The settings of the paper's filter: the defaults, with the half of Eq. 2 that asks whether the map explains what was
+/// observed. On line the other half blames the map for what the robot has not driven yet, and costs several times as much
+/// (`docs/costs.md`).
+pub const PAPER_FILTER: Config = Config { direction: Direction::HistoryToMap, ..Config::DEFAULT };
+/// The paper's filter in the place of the reference robot's.
+pub type PaperReference = PaperFilter<PAPER_PARTICLES, VERTICES, PAPER_HISTORY_WORDS>;

@@ -2,26 +2,25 @@
 //!
 //! ```sh
 //! cargo run --release -p toposlam-host-tests --example bench_input -- places > src/bin/support/bench_places.rs
+//! cargo run --release -p toposlam-host-tests --example bench_input -- hints > src/bin/support/bench_hints.rs
 //! cargo run --release -p toposlam-host-tests --example bench_input -- frames > src/bin/support/bench_frames.rs
 //! ```
 
+use toposlam::Turn;
+use toposlam::place::Place;
 use toposlam::reference::{self, Detector};
 use toposlam_host::world::{Plan, RobotModel, Simulation};
 
-/// More than the history of the reference robot holds, so that its ring wraps.
+/// As many as the history of the reference robot holds.
 const PLACES: usize = 400;
 const FRAMES: usize = 200;
 
 fn main() {
     let plan = Plan::built_in("office").expect("it is built in");
     let simulation = Simulation::new(&plan, RobotModel::default(), 1).expect("the plan has a Voronoi graph");
-    let frames = simulation.map(|(frame, _)| frame);
     match std::env::args().nth(1).as_deref() {
         Some("places") => {
-            let mut detector = Detector::new();
-            detector.start(reference::PLACE, reference::RING).expect("the reference settings are valid");
-            let places = frames.filter_map(|frame| detector.observe(&frame));
-            let radii_mm: Vec<_> = places.map(|place| place.fingerprint.radius_mm()).take(PLACES).collect();
+            let radii_mm: Vec<_> = places(simulation).iter().map(|(place, _)| place.fingerprint.radius_mm()).collect();
             println!(
                 "// The radii of {PLACES} places in millimetres, as the place detector found them on the simulated"
             );
@@ -34,21 +33,51 @@ fn main() {
             }
             println!("]");
         }
+        Some("hints") => {
+            println!(
+                "// What is known of these places besides: how the robot left the place before, b for back, o for on, - for"
+            );
+            println!(
+                "// unknown, and the degree that the detector told, 0 for unknown. `host-tests/examples/bench_input.rs` made"
+            );
+            println!("// this file.");
+            println!("[");
+            for row in places(simulation).chunks(14) {
+                let hints = row.iter().map(|(place, turn)| {
+                    let turn = match turn {
+                        None => '-',
+                        Some(Turn::Back) => 'b',
+                        Some(Turn::On) => 'o',
+                    };
+                    format!("*b\"{turn}{}\"", place.degree.unwrap_or(0))
+                });
+                println!("    {},", hints.collect::<Vec<_>>().join(", "));
+            }
+            println!("]");
+        }
         Some("frames") => {
             println!(
                 "// The first {FRAMES} ring frames of the simulated drive through the office plan with seed 1, ranges"
             );
             println!("// in millimetres, 0 for silence. `host-tests/examples/bench_input.rs` made this file.");
             println!("[");
-            for frame in frames.take(FRAMES) {
+            for (frame, _) in simulation.take(FRAMES) {
                 let ranges_mm = frame.echoes.map(|echo| echo.range_mm().unwrap_or(0).to_string());
                 println!("    [{}],", ranges_mm.join(", "));
             }
             println!("]");
         }
         _ => {
-            eprintln!("usage: bench_input places|frames");
+            eprintln!("usage: bench_input places|hints|frames");
             std::process::exit(2);
         }
     }
+}
+
+/// The places of a drive, and what the drive knows of how the robot left the place before each.
+fn places(simulation: Simulation) -> Vec<(Place, Option<Turn>)> {
+    let mut detector = Detector::new();
+    detector.start(reference::PLACE, reference::RING).expect("the reference settings are valid");
+    let places = simulation.filter_map(|(frame, truth)| Some((detector.observe(&frame)?, truth.turn)));
+    places.take(PLACES).collect()
 }

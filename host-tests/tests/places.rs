@@ -5,9 +5,9 @@ use std::io::Write;
 use std::path::Path;
 
 use proptest::prelude::*;
-use toposlam::FaultKind;
 use toposlam::place::{Place, PlaceConfig, PlaceDetector};
 use toposlam::ring::{Echo, RingFrame};
+use toposlam::{FaultKind, Turn};
 use toposlam_host::recording::Ring;
 use toposlam_host::world::{Journal, Plan, Report, RobotModel, SONARS, Simulation, SonarModel, even_ring};
 
@@ -52,6 +52,30 @@ fn places_of_the_office_floor_are_found_once() {
 #[test]
 fn places_of_the_flat_are_found_once() {
     places_are_found_once("flat");
+}
+
+#[test]
+fn the_drive_tells_rightly_whether_the_robot_turned_back_at_the_place_before() {
+    let plan = Plan::built_in("office").unwrap();
+    let mut simulation = Simulation::new(&plan, RobotModel::default(), 7).unwrap();
+    let mut journal = Journal::new(simulation.true_map());
+    let mut detector = PlaceDetector::<SONARS>::new();
+    detector.start(PlaceConfig::DEFAULT, even_ring()).unwrap();
+    let mut turns = Vec::new();
+    while turns.len() < 80 {
+        let (frame, truth) = simulation.next().unwrap();
+        journal.drive(&truth);
+        if let Some(place) = detector.observe(&frame) {
+            journal.detect(&place);
+            turns.push(truth.turn);
+        }
+    }
+    let nodes: Vec<_> = journal.detections().iter().map(|detection| detection.node.unwrap()).collect();
+    for (index, nodes) in nodes.windows(3).enumerate() {
+        let expected = if nodes[0] == nodes[2] { Turn::Back } else { Turn::On };
+        assert_eq!(turns[index + 2], Some(expected), "place {}", index + 2);
+    }
+    assert!(turns.iter().filter(|turn| **turn == Some(Turn::Back)).count() > 10);
 }
 
 #[test]

@@ -1,9 +1,10 @@
 //! A map made on this computer by the very stages that run on the robot, with the log that a person wants of it.
 
 use toposlam::place::Place;
-use toposlam::reference::{HISTORY_WORDS, PARTICLES, VERTICES};
-use toposlam::ring::RingFrame;
-use toposlam::{FaultCounters, Map, Mapper, MapperConfig, MapperError, Update};
+use toposlam::reference::{self, PaperReference, VERTICES};
+use toposlam::ring::{RingFrame, RingGeometry};
+use toposlam::wire::{Belief, Worst};
+use toposlam::{FaultCounters, Filter, Map, Mapper, MapperConfig, MapperError, Turn, Update};
 
 use crate::evaluation::ancestry::Ancestry;
 use crate::evaluation::graph::Graph;
@@ -39,30 +40,60 @@ impl std::fmt::Display for Step {
     }
 }
 
+/// Which filter maps, with the settings of the reference robot.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum FilterChoice {
+    /// The reference robot's own.
+    Robust,
+    /// The paper's, in its place.
+    Paper,
+}
+
+/// The stages with one filter or the other; the paper's needs a log of its particles to tell their paths.
+enum Stages<const SONARS: usize> {
+    Robust(Box<Mapper<SONARS, VERTICES, reference::Filter>>),
+    Paper(Box<Mapper<SONARS, VERTICES, PaperReference>>, Ancestry),
+}
+
+/// Says the same of either mapper.
+macro_rules! either {
+    ($stages:expr, $mapper:ident => $answer:expr) => {
+        match $stages {
+            Stages::Robust($mapper) => $answer,
+            Stages::Paper($mapper, _) => $answer,
+        }
+    };
+}
+
 /// The robot's stages for a ring of `SONARS`, with the capacities of the reference robot, and their log.
 pub struct Mapping<const SONARS: usize> {
-    mapper: Box<Mapper<SONARS, PARTICLES, VERTICES, HISTORY_WORDS>>,
-    ancestry: Ancestry,
+    stages: Stages<SONARS>,
     steps: Vec<Step>,
 }
 
 impl<const SONARS: usize> Mapping<SONARS> {
-    /// Starts a mapping.
+    /// Starts a mapping with the settings of the reference robot, for a ring and with a filter.
     ///
     /// # Errors
     /// The first setting that is out of its range.
-    pub fn start(config: &MapperConfig<SONARS>) -> Result<Self, MapperError> {
-        let mut mapper = Box::new(Mapper::new());
-        mapper.start(config)?;
-        Ok(Self { mapper, ancestry: Ancestry::new(), steps: Vec::new() })
+    pub fn start(geometry: RingGeometry<SONARS>, filter: FilterChoice) -> Result<Self, MapperError> {
+        let stages = match filter {
+            FilterChoice::Robust => Stages::Robust(started(geometry, reference::FILTER)?),
+            FilterChoice::Paper => Stages::Paper(started(geometry, reference::PAPER_FILTER)?, Ancestry::new()),
+        };
+        Ok(Self { stages, steps: Vec::new() })
     }
 
-    /// Takes one frame; gives a step when the robot has just been at a place.
-    pub fn observe(&mut self, frame: &RingFrame<SONARS>) -> Option<Step> {
-        let (place, update) = self.mapper.observe(frame, &FaultCounters::new(), |_| Ok(()))?;
-        let particles = self.mapper.filter().particles().iter();
-        self.ancestry.advance(particles.map(|particle| (particle.parent.into(), particle.place.into())));
-        let map = self.mapper.map();
+    /// Takes one frame, and what the drive knows of how the robot left the place before; gives a step when the robot has
+    /// just been at a place.
+    pub fn observe(&mut self, frame: &RingFrame<SONARS>, turn: Option<Turn>) -> Option<Step> {
+        let faults = FaultCounters::new();
+        let (place, update) = either!(&mut self.stages, mapper => mapper.observe(frame, turn, &faults, |_| Ok(())))?;
+        if let Stages::Paper(mapper, ancestry) = &mut self.stages {
+            let particles = mapper.filter().particles().iter();
+            ancestry.advance(particles.map(|particle| (particle.parent.into(), particle.place.into())));
+        }
+        let map = self.map();
         let step = Step { place, update, vertices: map.vertices(), edges: map.edges().count() };
         self.steps.push(step);
         Some(step)
@@ -75,21 +106,43 @@ impl<const SONARS: usize> Mapping<SONARS> {
 
     /// The best map.
     pub fn map(&self) -> &Map<VERTICES> {
-        self.mapper.map()
+        either!(&self.stages, mapper => mapper.map())
     }
 
     /// What went wrong: in the detector and in the filter.
     pub fn faults(&self) -> FaultCounters {
-        let mut faults = *self.mapper.detector().faults();
-        faults.add(self.mapper.filter().faults());
-        faults
+        either!(&self.stages, mapper => {
+            let mut faults = *mapper.detector().faults();
+            faults.add(mapper.filter().faults());
+            faults
+        })
     }
 
-    /// The vertex of the best map that each place so far was taken for, by the best hypothesis of now.
-    pub fn path(&self) -> &[usize] {
-        let filter = self.mapper.filter();
-        let best = filter.particles().iter().position(|particle| std::ptr::eq(particle, filter.best()));
-        best.map_or(&[], |best| self.ancestry.path(best))
+    /// Where the robot may be after the last place, and how far the map is to be trusted.
+    pub fn belief(&self) -> Option<Belief> {
+        let place_index = self.steps.last()?.update.place_index;
+        Some(either!(&self.stages, mapper => Belief::of(mapper.filter(), place_index)))
+    }
+
+    /// What the map explains worst after the last place.
+    pub fn worst(&self) -> Option<Worst> {
+        let place_index = self.steps.last()?.update.place_index;
+        Some(either!(&self.stages, mapper => Worst::of(mapper.filter(), place_index)))
+    }
+
+    /// The vertex of the best map that each place so far was taken for, by the best hypothesis of now; `None` for a place
+    /// that is older than the filter's history.
+    pub fn path(&self) -> Vec<Option<usize>> {
+        let known: Vec<usize> = match &self.stages {
+            Stages::Robust(mapper) => mapper.filter().path().map(usize::from).collect(),
+            Stages::Paper(mapper, ancestry) => {
+                let filter = mapper.filter();
+                let best = filter.particles().iter().position(|particle| std::ptr::eq(particle, filter.best()));
+                best.map_or(Vec::new(), |best| ancestry.path(best).to_vec())
+            }
+        };
+        let forgotten = self.steps.len().saturating_sub(known.len());
+        std::iter::repeat_n(None, forgotten).chain(known.into_iter().map(Some)).collect()
     }
 
     /// How right the best map is. `nodes` is the true node of each place so far; phantoms have none and do not count.
@@ -103,7 +156,8 @@ impl<const SONARS: usize> Mapping<SONARS> {
         visited.sort_unstable();
         visited.dedup();
         let class = |node: usize| visited.binary_search(&node).ok();
-        let real = self.path().iter().zip(nodes).filter_map(|(&vertex, &node)| Some((vertex, class(node?)?)));
+        let path = self.path();
+        let real = path.iter().zip(nodes).filter_map(|(&vertex, &node)| Some((vertex?, class(node?)?)));
         let (path, classes): (Vec<usize>, Vec<usize>) = real.unzip();
         let is_edge = |&(from, to): &(usize, usize)| {
             let ends = [visited[from], visited[to]];
@@ -113,4 +167,13 @@ impl<const SONARS: usize> Mapping<SONARS> {
         let truth = Graph::from_edges(visited.len(), traversed);
         score_map(&map, &path, &truth, &classes)
     }
+}
+
+fn started<const SONARS: usize, F: Filter<VERTICES>>(
+    geometry: RingGeometry<SONARS>,
+    filter: F::Config,
+) -> Result<Box<Mapper<SONARS, VERTICES, F>>, MapperError> {
+    let mut mapper = Box::new(Mapper::new());
+    mapper.start(&MapperConfig { geometry, place: reference::PLACE, filter, seed: reference::SEED, boot: 0 })?;
+    Ok(mapper)
 }

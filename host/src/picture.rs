@@ -37,9 +37,9 @@ impl Drawing {
         detections: &[Detection],
         caption: String,
     ) -> Self {
-        let map = mapping.map();
+        let (map, path) = (mapping.map(), mapping.path());
         let vertices = (0..map.vertices()).zip(map.labels()).map(|(vertex, label)| {
-            let visits = mapping.path().iter().zip(detections).filter(|&(&visited, _)| visited == usize::from(vertex));
+            let visits = path.iter().zip(detections).filter(|&(&visited, _)| visited == Some(usize::from(vertex)));
             Vertex {
                 position: mostly_at(&visits.map(|(_, detection)| *detection).collect::<Vec<_>>()),
                 radius_mm: label.radius_mm().into(),

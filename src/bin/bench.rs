@@ -22,25 +22,18 @@ use cortex_m_semihosting::{debug, hprintln};
 use defmt_rtt as _;
 use static_cell::ConstStaticCell;
 use toposlam::{
-    Config, Consistency, Direction, Fingerprint, History,
-    reference::{self, Detector, Filter, HISTORY_WORDS, PARTICLES, RobotMapper, SONARS, VERTICES},
+    Filter as _, Fingerprint, Observation, RobustConfig, RobustFilter, Turn, Update,
+    reference::{self, Detector, Filter, HISTORY, PaperReference, RobotMapper, SONARS, VERTICES},
     ring::{Echo, RingFrame},
     wire::{Capacities, Encoder, Hello, MAX_FRAME_BYTES, QueueFull, Reporter},
 };
 
 /// Radii in millimetres, place after place.
 const PLACES_MM: [u16; 400] = include!("support/bench_places.rs");
+/// What else is known of each place: `b`, `o` or `-` for the turn at the place before, and the degree.
+const HINTS: [[u8; 2]; PLACES_MM.len()] = include!("support/bench_hints.rs");
 /// Ranges in millimetres, frame after frame; 0 is silence.
 const FRAMES_MM: [[u16; SONARS]; 200] = include!("support/bench_frames.rs");
-/// What the robot introduces itself with.
-const CAPACITIES: Capacities = Capacities {
-    vertices: VERTICES as u8,
-    hypotheses: PARTICLES as u16,
-    history: History::<HISTORY_WORDS>::CAPACITY as u16,
-    ngram_length: reference::FILTER.ngram_length,
-    fingerprint_step_mm: Fingerprint::STEP_MM as u8,
-    sonars: SONARS as u8,
-};
 const TICKS_PER_TURN: u32 = 1 << 24;
 static TURNS: AtomicU32 = AtomicU32::new(0);
 
@@ -103,20 +96,26 @@ fn loop_of_known_length(turns: u32) {
     }
 }
 
-const DIRECTIONS: [(&str, Direction); 3] = [
-    ("two_sided_instructions_per_place", Direction::TwoSided),
-    ("map_to_history_instructions_per_place", Direction::MapToHistory),
-    ("history_to_map_instructions_per_place", Direction::HistoryToMap),
-];
+/// A filter beyond the reference robot's: more hypotheses and more vertices.
+const MORE: usize = 32;
+type LargeFilter = RobustFilter<MORE, MORE, HISTORY>;
+const LARGE_FILTER: RobustConfig = RobustConfig { hypotheses: MORE as u8, ..reference::FILTER };
+
+/// One filter after the other in the same memory: all of them do not fit beside each other.
+#[allow(clippy::large_enum_variant)]
+enum Filters {
+    Robot(Filter),
+    Paper(PaperReference),
+    Large(LargeFilter),
+}
 
 /// The measurements of one kind, in the order in which they were made.
 struct Costs<const LENGTH: usize> {
-    values: [u64; LENGTH],
+    values: [u32; LENGTH],
     held: usize,
 }
 
-/// One for each place in each direction.
-type PlaceCosts = Costs<{ DIRECTIONS.len() * PLACES_MM.len() }>;
+type PlaceCosts = Costs<{ PLACES_MM.len() }>;
 type FrameCosts = Costs<{ FRAMES_MM.len() }>;
 
 impl<const LENGTH: usize> Costs<LENGTH> {
@@ -126,115 +125,157 @@ impl<const LENGTH: usize> Costs<LENGTH> {
 
     fn push(&mut self, value: u64) {
         if let Some(slot) = self.values.get_mut(self.held) {
-            *slot = value;
+            *slot = u32::try_from(value).unwrap_or(u32::MAX);
             self.held += 1;
         }
     }
-}
 
-/// Prints median, 90th percentile and largest of some measurements.
-fn print_quantiles(name: &str, values: &mut [u64]) {
-    values.sort_unstable();
-    for (quantile, percent) in [("median", 50), ("p90", 90), ("worst", 100)] {
-        let rank = (values.len() * percent / 100).min(values.len().saturating_sub(1));
-        hprintln!("{}_{}: {}", name, quantile, values.get(rank).copied().unwrap_or(0));
+    /// Prints mean, median, 90th percentile and largest.
+    fn print(&mut self, name: &str) {
+        let total: u64 = self.values.iter().map(|&value| u64::from(value)).sum();
+        hprintln!("{}_mean: {}", name, total / LENGTH as u64);
+        self.values.sort_unstable();
+        for (quantile, percent) in [("median", 50), ("p90", 90), ("worst", 100)] {
+            let rank = (LENGTH * percent / 100).min(LENGTH.saturating_sub(1));
+            hprintln!("{}_{}: {}", name, quantile, self.values.get(rank).copied().unwrap_or(0));
+        }
     }
 }
 
-/// The stages under measurement and what they cost.
-struct Bench {
-    clock: Clock,
-    filter: &'static mut Filter,
-    detector: &'static mut Detector,
+/// What the filter is told of a place.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Told {
+    /// What the robot of today tells: radius and degree.
+    NoTurns,
+    /// The turn at the place before as well.
+    Turns,
+}
+
+fn observation(radius_mm: u16, [turn, degree]: [u8; 2], told: Told) -> Observation {
+    let Ok(fingerprint) = Fingerprint::from_radius_mm(radius_mm) else { panic!() };
+    let turn = match turn {
+        b'b' if told == Told::Turns => Some(Turn::Back),
+        b'o' if told == Told::Turns => Some(Turn::On),
+        _ => None,
+    };
+    let degree = Some(degree - b'0').filter(|&degree| degree > 0);
+    Observation { turn, degree, ..Observation::new(fingerprint) }
+}
+
+/// One recorded place after the other through a filter; after each, `then` has a look at it.
+fn run<const V: usize, F: toposlam::Filter<V>>(
+    clock: &Clock,
+    filter: &mut F,
+    config: F::Config,
+    told: Told,
+    costs: &mut PlaceCosts,
+    mut then: impl FnMut(&F, &Update),
+) {
+    let Ok(()) = filter.start(config, reference::SEED) else { panic!() };
+    for (&radius_mm, &hints) in PLACES_MM.iter().zip(&HINTS) {
+        let observation = observation(radius_mm, hints, told);
+        let (instructions, update) = clock.measure(|| filter.observe(black_box(observation)));
+        costs.push(instructions);
+        then(filter, &update);
+    }
+}
+
+/// Puts on the wire what a filter found, and measures that.
+struct Wire {
     reporter: &'static mut Reporter<VERTICES>,
-    filter_costs: &'static mut PlaceCosts,
-    report_costs: &'static mut PlaceCosts,
-    detector_costs: &'static mut FrameCosts,
-    largest_report_bytes: usize,
+    encoder: Encoder,
+    costs: &'static mut PlaceCosts,
+    largest_bytes: usize,
 }
 
-impl Bench {
-    /// One recorded place after the other through the filter with one direction of Eq. 2, and what it found on to the
-    /// wire.
-    fn filter(&mut self, direction: Direction) {
-        let Ok(()) = self.filter.start(Config { direction, ..reference::FILTER }, reference::SEED) else { panic!() };
-        self.reporter.start(Hello::new(0, reference::SEED, CAPACITIES), u16::MAX);
-        let mut encoder = Encoder::new(0);
-        for &radius_mm in &PLACES_MM {
-            let Ok(fingerprint) = Fingerprint::from_radius_mm(radius_mm) else { panic!() };
-            let (instructions, update) = self.clock.measure(|| self.filter.observe(black_box(fingerprint)));
-            self.filter_costs.push(instructions);
-            let (instructions, bytes) = self.clock.measure(|| {
-                let mut bytes = 0;
-                self.reporter.update(self.filter.map(), black_box(&update), |message| {
-                    let mut frame = [0; MAX_FRAME_BYTES];
-                    let frame = encoder.encode(message, &mut frame).map_err(|_| QueueFull)?;
-                    bytes += black_box(frame).len();
-                    Ok(())
-                });
-                bytes
+impl Wire {
+    fn report(&mut self, clock: &Clock, filter: &Filter, update: &Update) {
+        let (instructions, bytes) = clock.measure(|| {
+            let mut bytes = 0;
+            self.reporter.update(filter, black_box(update), |message| {
+                let mut frame = [0; MAX_FRAME_BYTES];
+                let frame = self.encoder.encode(message, &mut frame).map_err(|_| QueueFull)?;
+                bytes += black_box(frame).len();
+                Ok(())
             });
-            self.report_costs.push(instructions);
-            self.largest_report_bytes = self.largest_report_bytes.max(bytes);
-        }
+            bytes
+        });
+        self.costs.push(instructions);
+        self.largest_bytes = self.largest_bytes.max(bytes);
     }
+}
 
-    /// Recorded frames through the place detector. Returns how many places there were.
-    fn detector(&mut self) -> usize {
-        let Ok(()) = self.detector.start(reference::PLACE, reference::RING) else { panic!() };
-        let mut places = 0;
-        for ranges_mm in &FRAMES_MM {
-            let echo = |range_mm| if range_mm == 0 { Echo::Silence } else { Echo::Range { range_mm } };
-            let frame = RingFrame { echoes: ranges_mm.map(echo) };
-            let (instructions, place) = self.clock.measure(|| self.detector.observe(black_box(&frame)));
-            places += usize::from(place.is_some());
-            self.detector_costs.push(instructions);
-        }
-        places
+/// Recorded frames through the place detector. Returns how many places there were.
+fn detect(clock: &Clock, detector: &mut Detector, costs: &mut FrameCosts) -> usize {
+    let Ok(()) = detector.start(reference::PLACE, reference::RING) else { panic!() };
+    let mut places = 0;
+    for ranges_mm in &FRAMES_MM {
+        let echo = |range_mm| if range_mm == 0 { Echo::Silence } else { Echo::Range { range_mm } };
+        let frame = RingFrame { echoes: ranges_mm.map(echo) };
+        let (instructions, place) = clock.measure(|| detector.observe(black_box(&frame)));
+        places += usize::from(place.is_some());
+        costs.push(instructions);
     }
+    places
 }
 
 #[cortex_m_rt::entry]
 fn main() -> ! {
-    static FILTER: ConstStaticCell<Filter> = ConstStaticCell::new(Filter::new());
+    static FILTERS: ConstStaticCell<Filters> = ConstStaticCell::new(Filters::Robot(Filter::new()));
     static DETECTOR: ConstStaticCell<Detector> = ConstStaticCell::new(Detector::new());
     static REPORTER: ConstStaticCell<Reporter<VERTICES>> = ConstStaticCell::new(Reporter::new());
-    static FILTER_COSTS: ConstStaticCell<PlaceCosts> = ConstStaticCell::new(Costs::new());
-    static REPORT_COSTS: ConstStaticCell<PlaceCosts> = ConstStaticCell::new(Costs::new());
+    static COSTS: ConstStaticCell<[PlaceCosts; 5]> = ConstStaticCell::new([const { PlaceCosts::new() }; 5]);
     static DETECTOR_COSTS: ConstStaticCell<FrameCosts> = ConstStaticCell::new(Costs::new());
 
     let Some(core) = cortex_m::Peripherals::take() else { panic!() };
-    let mut bench = Bench {
-        clock: Clock::start(core.SYST),
-        filter: FILTER.take(),
-        detector: DETECTOR.take(),
-        reporter: REPORTER.take(),
-        filter_costs: FILTER_COSTS.take(),
-        report_costs: REPORT_COSTS.take(),
-        detector_costs: DETECTOR_COSTS.take(),
-        largest_report_bytes: 0,
+    let clock = &Clock::start(core.SYST);
+    let (filters, detector_costs) = (FILTERS.take(), DETECTOR_COSTS.take());
+    let [turn_costs, costs, large_costs, paper_costs, report_costs] = COSTS.take();
+    let mut wire = Wire { reporter: REPORTER.take(), encoder: Encoder::new(0), costs: report_costs, largest_bytes: 0 };
+    let capacities = Filter::capacities(&reference::FILTER);
+    let capacities = Capacities {
+        vertices: VERTICES as u8,
+        hypotheses: capacities.hypotheses,
+        history: capacities.history,
+        ngram_length: capacities.ngram_length,
+        fingerprint_step_mm: Fingerprint::STEP_MM as u8,
+        sonars: SONARS as u8,
     };
-    let places_detected = bench.detector();
-    for (_, direction) in DIRECTIONS {
-        bench.filter(direction);
+    wire.reporter.start(Hello::new(0, reference::SEED, capacities), u16::MAX);
+
+    let places_detected = detect(clock, DETECTOR.take(), detector_costs);
+    if let Filters::Robot(filter) = filters {
+        run(clock, filter, reference::FILTER, Told::Turns, turn_costs, |_, _| {});
+        let report = |filter: &Filter, update: &Update| wire.report(clock, filter, update);
+        run(clock, filter, reference::FILTER, Told::NoTurns, costs, report);
     }
-    // Before sorting and formatting, which are no part of the job, add to it.
+    *filters = const { Filters::Paper(PaperReference::new()) };
+    if let Filters::Paper(filter) = filters {
+        run(clock, filter, reference::PAPER_FILTER, Told::NoTurns, paper_costs, |_, _| {});
+    }
+    // Of the robot's own stages, before the larger filter, sorting and formatting add to it.
     let stack_bytes = support::stack_high_water_bytes();
+    *filters = const { Filters::Large(LargeFilter::new()) };
+    if let Filters::Large(filter) = filters {
+        run(clock, filter, LARGE_FILTER, Told::Turns, large_costs, |_, _| {});
+    }
 
     hprintln!("places: {}", PLACES_MM.len());
-    hprintln!("history_places: {}", History::<HISTORY_WORDS>::CAPACITY);
-    for ((name, _), costs) in DIRECTIONS.iter().zip(bench.filter_costs.values.chunks_mut(PLACES_MM.len())) {
-        print_quantiles(name, costs);
-    }
-    print_quantiles("report_instructions_per_place", &mut bench.report_costs.values);
-    hprintln!("report_bytes_per_place_worst: {}", bench.largest_report_bytes);
+    hprintln!("history_places: {}", HISTORY);
+    turn_costs.print("robust_turn_instructions_per_place");
+    costs.print("robust_instructions_per_place");
+    large_costs.print("robust_32_turn_instructions_per_place");
+    paper_costs.print("history_to_map_instructions_per_place");
+    wire.costs.print("report_instructions_per_place");
+    hprintln!("report_bytes_per_place_worst: {}", wire.largest_bytes);
     hprintln!("frames: {}", FRAMES_MM.len());
     hprintln!("frames_places_detected: {}", places_detected);
-    print_quantiles("detector_instructions_per_frame", &mut bench.detector_costs.values);
-    hprintln!("ticks_per_million_instructions: {}", bench.clock.ticks_of_two_million / 2);
+    detector_costs.print("detector_instructions_per_frame");
+    hprintln!("ticks_per_million_instructions: {}", clock.ticks_of_two_million / 2);
     hprintln!("filter_bytes: {}", size_of::<Filter>());
+    hprintln!("large_filter_bytes: {}", size_of::<LargeFilter>());
+    hprintln!("paper_filter_bytes: {}", size_of::<PaperReference>());
     hprintln!("mapper_bytes: {}", size_of::<RobotMapper>());
-    hprintln!("consistency_scratch_bytes: {}", size_of::<Consistency<VERTICES, HISTORY_WORDS, 1>>());
     hprintln!("stack_high_water_bytes: {}", stack_bytes);
     debug::exit(debug::EXIT_SUCCESS);
     loop {

@@ -52,6 +52,7 @@ fn main() -> ! {
     proof::fingerprint_and_ngram();
     proof::map_and_history();
     proof::filter();
+    proof::robust_filter();
     proof::place();
     proof::mapper();
     proof::wire();

@@ -223,7 +223,8 @@ fn main() -> ! {
         if let Ok(mut transmitter) = transmitter.try_borrow_mut() {
             let mut faults = ring_faults;
             faults.add(&transmitter.faults);
-            if let Some((_, update)) = mapper.observe(&frame, &faults, |message| transmitter.send(message)) {
+            // There is no drive yet that could tell how the robot left the place before.
+            if let Some((_, update)) = mapper.observe(&frame, None, &faults, |message| transmitter.send(message)) {
                 defmt::info!("{}", update);
             }
             if loop_count.is_multiple_of(FRAMES_PER_HEALTH) {

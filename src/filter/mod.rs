@@ -1,8 +1,10 @@
 //! Topological SLAM from a sequence of places: the filters, and what an observation tells of their best map.
 
+mod interface;
 mod paper;
 mod robust;
 
+pub use interface::{Filter, FilterCapacities};
 pub use paper::{Config, PaperFilter, Particle, Prior};
 pub use robust::{RobustConfig, RobustFilter};
 
@@ -46,6 +48,30 @@ impl WeightFactors {
     /// ln of the weight (Eq. 6), in units of 2⁻¹⁶ nats; saturates.
     pub const fn ln_weight_q16(&self) -> i32 {
         self.ln_size_q16.saturating_add(self.ln_label_q16).saturating_add(self.ln_consistency_q16)
+    }
+}
+
+/// The n-gram of the history that is farthest from every walk of the best map, and the walk that comes nearest to it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct WorstNgram {
+    /// How far, in millimetres: the half of Eq. 2 that asks whether the map explains what was observed; `u16::MAX` when
+    /// it is infinite.
+    pub distance_mm: u16,
+    /// How many labels the n-gram has; 0 when only the distance is known.
+    pub length: u8,
+    /// How many places ago the newest of its labels was observed; 0 for the newest place.
+    pub newest_age: u16,
+    /// The vertices of the nearest walk, the oldest first, `length` of them.
+    pub vertices: [u8; 7],
+}
+
+impl WorstNgram {
+    /// No n-gram.
+    pub const NONE: Self = Self { distance_mm: 0, length: 0, newest_age: 0, vertices: [0; 7] };
+
+    /// The vertices of the nearest walk, the oldest first.
+    pub fn walk(&self) -> &[u8] {
+        self.vertices.get(..usize::from(self.length)).unwrap_or(&self.vertices)
     }
 }
 

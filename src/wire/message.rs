@@ -4,16 +4,16 @@ use core::fmt;
 
 use serde::{Deserialize, Serialize};
 
-use super::Echoes;
+use super::{Belief, Echoes, Renamed, Worst};
 use crate::Update;
 
 /// The version of the message set; it grows by one whenever messages are appended.
-pub const PROTOCOL_VERSION: u16 = 1;
+pub const PROTOCOL_VERSION: u16 = 2;
 
 /// FNV-1a (64 bit) of the description of all messages that `docs/wire.md` prints; a test recomputes it from the types.
-pub const SCHEMA_HASH: u64 = 0xAD3E_BE73_35E6_91B9;
+pub const SCHEMA_HASH: u64 = 0x4F39_CE1F_451B_B26E;
 
-/// One message from the robot. All of them state facts in absolute terms; none is an increment.
+/// One message from the robot. All of them but [`Message::Renamed`] state facts in absolute terms and are no increment.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[non_exhaustive]
 pub enum Message {
@@ -79,6 +79,12 @@ pub enum Message {
         /// What each sonar said, in the order of the ring's geometry.
         echoes: Echoes,
     },
+    /// Where the robot may be, and how far the map is to be trusted.
+    Belief(Belief),
+    /// The vertices have new numbers from here on: some were merged, split off, left out or put in another order.
+    Renamed(Renamed),
+    /// What the map explains worst.
+    Worst(Worst),
 }
 
 /// Who is speaking.
@@ -141,6 +147,13 @@ pub struct Location {
     pub place_index: u32,
     /// The vertex that the place was taken for.
     pub vertex: u8,
+}
+
+impl Location {
+    /// The same place under new numbers; `None` when its vertex is gone.
+    pub(super) fn renamed(self, renamed: &Renamed) -> Option<Self> {
+        Some(Self { vertex: renamed.now(self.vertex)?, ..self })
+    }
 }
 
 impl From<&Update> for Location {

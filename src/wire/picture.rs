@@ -3,14 +3,14 @@
 use super::decoder::{Arrival, Header};
 use super::digest::rows_digest;
 use super::reporter::bit;
-use super::{Evidence, Health, Hello, Location, Message, Row};
+use super::{Belief, Evidence, Health, Hello, Location, Message, Renamed, Row, Worst};
 use crate::FaultKind;
 use crate::map::bits;
 
 /// The map as heard so far, and whether it is the robot's.
 ///
 /// Any message may be missing, doubled or late: late ones are ignored, and what is missing comes round with the
-/// rolling picture. `V` has to be at least the robot's; 64 always is. Memory: 16 bytes for each vertex and about 160 bytes.
+/// rolling picture. `V` has to be at least the robot's; 64 always is. Memory: 16 bytes for each vertex and about 230 bytes.
 #[derive(Clone, Debug)]
 pub struct Picture<const V: usize> {
     vertices: u8,
@@ -24,6 +24,8 @@ pub struct Picture<const V: usize> {
     location: Option<Location>,
     evidence: Option<Evidence>,
     health: Option<Health>,
+    belief: Option<Belief>,
+    worst: Option<Worst>,
     faults: [u32; FaultKind::ALL.len()],
 }
 
@@ -41,6 +43,8 @@ impl<const V: usize> Picture<V> {
             location: None,
             evidence: None,
             health: None,
+            belief: None,
+            worst: None,
             faults: [0; FaultKind::ALL.len()],
         }
     }
@@ -75,6 +79,9 @@ impl<const V: usize> Picture<V> {
                     *slot = count;
                 }
             }
+            Message::Belief(belief) => self.belief = Some(belief),
+            Message::Renamed(renamed) => self.rename(&renamed),
+            Message::Worst(worst) => self.worst = Some(worst),
             Message::Place { .. } | Message::Ring { .. } => {}
         }
     }
@@ -132,9 +139,32 @@ impl<const V: usize> Picture<V> {
         self.health
     }
 
+    /// Where the robot may be and how far the map is to be trusted, as last heard.
+    pub const fn belief(&self) -> Option<Belief> {
+        self.belief
+    }
+
+    /// What the map explains worst, as last heard.
+    pub const fn worst(&self) -> Option<Worst> {
+        self.worst
+    }
+
     /// How often a kind of fault was seen, as far as heard.
     pub fn fault(&self, kind: FaultKind) -> u32 {
         self.faults.get(kind as usize).copied().unwrap_or(0)
+    }
+
+    /// Gives the vertices their new numbers, wherever they were heard of. The map is that of the update once its size
+    /// follows; until then the digest of the map before means nothing.
+    fn rename(&mut self, renamed: &Renamed) {
+        self.digest = None;
+        self.vertices = renamed.vertices(self.vertices).min(V as u8);
+        self.labelled = renamed.apply(&mut self.labels, &mut self.neighbours, self.labelled);
+        self.location = self.location.and_then(|location| location.renamed(renamed));
+        if let Some(belief) = &mut self.belief {
+            belief.rename(renamed);
+        }
+        self.worst = self.worst.and_then(|worst| worst.renamed(renamed));
     }
 
     fn set_label(&mut self, vertex: u8, radius_mm: u16, visits: u32) {

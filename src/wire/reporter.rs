@@ -3,15 +3,15 @@
 use core::fmt;
 
 use super::digest::{map_digest, row_of};
-use super::{Capacities, Evidence, Hello, Location, Message, Row};
-use crate::{FaultCounters, FaultKind, Map, Update};
+use super::{Belief, Capacities, Evidence, Hello, Location, Message, Renamed, Row, Worst};
+use crate::{FaultCounters, FaultKind, Filter, Map, Update};
 
 /// Decides what to send. It keeps what the listener was last told and hands each message to a callback, which says
 /// whether the transmit queue took it; it never waits.
 ///
 /// A message that was refused counts as not sent: the change goes out with the next update or with the rolling
 /// picture, whichever comes first. Messages that are no state (`Place`, `Health`, `Ring`) the caller sends on its own.
-/// Memory: 16 bytes for each vertex and about 100 bytes.
+/// Memory: 16 bytes for each vertex and about 150 bytes.
 #[derive(Clone, Debug)]
 pub struct Reporter<const V: usize> {
     hello: Hello,
@@ -20,7 +20,10 @@ pub struct Reporter<const V: usize> {
     vertices: u8,
     labels: [(u16, u32); V],
     neighbours: [u64; V],
+    /// How many vertices the filter's map had after the last place.
+    vertices_before: u8,
     location: Option<Location>,
+    belief: Option<Belief>,
     faults: [u32; FaultKind::ALL.len()],
     /// Whose turn it is in the rolling picture: a vertex, or one of the turns that follow the last vertex.
     turn: u8,
@@ -40,7 +43,9 @@ impl<const V: usize> Reporter<V> {
             vertices: 0,
             labels: [(0, 0); V],
             neighbours: [0; V],
+            vertices_before: 0,
             location: None,
+            belief: None,
             faults: [0; FaultKind::ALL.len()],
             turn: 0,
             fault_turn: 0,
@@ -57,7 +62,9 @@ impl<const V: usize> Reporter<V> {
         self.ticks_to_hello = 0;
         self.vertices = 0;
         self.neighbours = [0; V];
+        self.vertices_before = 0;
         self.location = None;
+        self.belief = None;
         self.faults = [0; FaultKind::ALL.len()];
         self.turn = 0;
         self.fault_turn = 0;
@@ -69,16 +76,34 @@ impl<const V: usize> Reporter<V> {
         self.refused
     }
 
-    /// After each place: sends what is new in the filter's best map, how large it is, where the robot is and why.
+    /// After each place: sends what became of the vertices, what is new in the filter's best map, how large it is, where
+    /// the robot is and may be, and why.
     ///
     /// A vertex of which several edges changed goes out as one `Row`, so that a change of the best hypothesis cannot
-    /// flood the line: at most 2 `V` + 3 messages. Cost: linear in the number of vertices.
-    pub fn update(&mut self, map: &Map<V>, update: &Update, mut send: impl FnMut(&Message) -> Result<(), QueueFull>) {
+    /// flood the line: at most 2 `V` + 6 messages. Cost: linear in the number of vertices and edges.
+    pub fn update(
+        &mut self,
+        filter: &impl Filter<V>,
+        update: &Update,
+        mut send: impl FnMut(&Message) -> Result<(), QueueFull>,
+    ) {
+        let map = filter.map();
+        let renamed = Renamed::of(filter, self.vertices_before, update.place_index);
+        self.vertices_before = map.vertices();
+        let mut changed = false;
+        // A listener that does not hear of it keeps the old numbers, and so does what it was told; the messages that
+        // follow state what differs.
+        if let Some(renamed) = renamed
+            && self.send(&Message::Renamed(renamed), &mut send)
+        {
+            changed = true;
+            self.tell_renamed(&renamed);
+        }
         let told_vertices = self.vertices;
         if map.vertices() < told_vertices {
             self.forget_from(map.vertices());
         }
-        let mut changed = map.vertices() != told_vertices;
+        changed |= map.vertices() != told_vertices;
         for vertex in 0..map.vertices() {
             let row = row_of(map, vertex);
             if self.flips(&row).count_ones() > 1 {
@@ -111,13 +136,18 @@ impl<const V: usize> Reporter<V> {
         if self.location != Some(location) && self.send(&Message::Location(location), &mut send) {
             self.location = Some(location);
         }
+        let belief = Belief::of(filter, update.place_index);
+        if self.send(&Message::Belief(belief), &mut send) {
+            self.belief = Some(belief);
+        }
         self.send(&Message::Evidence(Evidence::from(update)), &mut send);
+        self.send(&Message::Worst(Worst::of(filter, update.place_index)), &mut send);
     }
 
     /// At a steady pace: sends the faults whose count has changed and the next piece of the rolling picture.
     ///
-    /// The pieces are every vertex of the map, the size of the map, the location, and one fault that was ever seen. A
-    /// listener that hears the `vertices + 3` ticks of one round without a loss has converged. At most one message for
+    /// The pieces are every vertex of the map, the size of the map, the location, the belief, and one fault that was ever
+    /// seen. A listener that hears the `vertices + 4` ticks of one round without a loss has converged. At most one message for
     /// each kind of fault, a `Hello` and a piece.
     pub fn tick(
         &mut self,
@@ -139,10 +169,11 @@ impl<const V: usize> Reporter<V> {
             None => self.send_row(row_of(map, self.turn), &mut send),
             Some(0) => self.send_size(map, &mut send),
             Some(1) => self.location.is_none_or(|location| self.send(&Message::Location(location), &mut send)),
+            Some(2) => self.belief.is_none_or(|belief| self.send(&Message::Belief(belief), &mut send)),
             Some(_) => self.next_fault(faults).is_none_or(|kind| self.send_fault(kind, faults.of(kind), &mut send)),
         };
         if done {
-            self.turn = if self.turn >= vertices.saturating_add(2) { 0 } else { self.turn.saturating_add(1) };
+            self.turn = if self.turn >= vertices.saturating_add(3) { 0 } else { self.turn.saturating_add(1) };
         }
     }
 
@@ -204,6 +235,16 @@ impl<const V: usize> Reporter<V> {
 
     fn label_told(&self, vertex: u8) -> Option<(u16, u32)> {
         if vertex < self.vertices { self.labels.get(usize::from(vertex)).copied() } else { None }
+    }
+
+    fn tell_renamed(&mut self, renamed: &Renamed) {
+        let labelled = bit(self.vertices).wrapping_sub(1);
+        renamed.apply(&mut self.labels, &mut self.neighbours, labelled);
+        self.vertices = renamed.vertices(self.vertices).min(V as u8);
+        self.location = self.location.and_then(|location| location.renamed(renamed));
+        if let Some(belief) = &mut self.belief {
+            belief.rename(renamed);
+        }
     }
 
     fn tell_label(&mut self, row: &Row) {

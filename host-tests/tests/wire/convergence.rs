@@ -2,8 +2,10 @@
 
 use super::frame;
 use super::robot::{Random, Robot, TICKS_PER_HELLO};
-use toposlam::wire::{Decoder, Evidence, Location, Message, Picture, Progress, map_digest};
-use toposlam::{FaultKind, Fingerprint, Map, Update};
+use toposlam::wire::{
+    Belief, Decoder, Evidence, List, Location, Message, Picture, PlaceProbability, Progress, Renamed, Worst, map_digest,
+};
+use toposlam::{FaultKind, Fingerprint, Map, Update, WorstNgram};
 
 const V: usize = 16;
 
@@ -52,19 +54,17 @@ fn a_listener_from_the_start_has_the_map_after_every_place() {
     let mut robot = Robot::<V>::new(1);
     let mut listener = Listener::<64>::new();
     for step in 0..2000 {
-        if random.happens(10) {
-            robot.change_hypothesis(&mut random)
-        } else {
-            robot.drive(&mut random)
-        }
+        robot.change(&mut random);
         for frame in robot.place(&mut random) {
             listener.hear(&frame);
         }
         // A row with many changes goes out whole, so nothing waits for the rolling picture.
         assert!(listener.picture.is_converged(), "place {step}");
-        assert!(same(&listener.picture, &robot.map), "place {step}");
+        assert!(same(&listener.picture, &robot.filter.map), "place {step}");
         assert_eq!(listener.picture.location(), Some(Location::from(&Update { place_index: step, ..robot.update() })));
         assert_eq!(listener.picture.evidence().map(|evidence| evidence.place_index), Some(step));
+        assert_eq!(listener.picture.belief(), Some(Belief::of(&robot.filter, step)));
+        assert_eq!(listener.picture.worst(), Some(Worst::of(&robot.filter, step)));
     }
 }
 
@@ -74,19 +74,19 @@ fn an_unchanged_map_is_not_sent_again_at_a_place() {
     let mut robot = Robot::<V>::new(1);
     robot.change_hypothesis(&mut random);
     robot.place(&mut random);
-    assert_eq!(robot.place(&mut random).len(), 2, "location and evidence");
+    assert_eq!(robot.place(&mut random).len(), 4, "location, belief, evidence and the worst n-gram");
 }
 
 #[test]
 fn one_new_vertex_and_its_edge_go_out_as_events() {
     let mut robot = Robot::<V>::new(1);
-    robot.map.add_vertex(Fingerprint::ZERO).expect("there is room");
+    robot.filter.map.add_vertex(Fingerprint::ZERO).expect("there is room");
     robot.place(&mut Random(3));
-    robot.map.add_vertex(Fingerprint::MAX).expect("there is room");
-    robot.map.add_edge(0, 1);
-    robot.location = 1;
+    robot.filter.map.add_vertex(Fingerprint::MAX).expect("there is room");
+    robot.filter.map.add_edge(0, 1);
+    robot.filter.location = 1;
     let mut told = Vec::new();
-    robot.reporter.update(&robot.map, &robot.update(), |message| {
+    robot.reporter.update(&robot.filter, &robot.update(), |message| {
         told.push(*message);
         Ok(())
     });
@@ -94,11 +94,104 @@ fn one_new_vertex_and_its_edge_go_out_as_events() {
     let expected = [
         Message::Vertex { vertex: 1, radius_mm: Fingerprint::MAX.radius_mm(), visits: 1 },
         Message::Edge { a: 0, b: 1, present: true },
-        Message::Map { vertices: 2, edges: 1, digest: map_digest(&robot.map) },
+        Message::Map { vertices: 2, edges: 1, digest: map_digest(&robot.filter.map) },
         Message::Location(Location::from(&update)),
+        Message::Belief(Belief::of(&robot.filter, update.place_index)),
         Message::Evidence(Evidence::from(&update)),
+        Message::Worst(Worst::of(&robot.filter, update.place_index)),
     ];
     assert_eq!(told, expected);
+}
+
+/// A map of a chain of vertices with these labels, told to a listener.
+fn chain(labels: &[u16]) -> (Robot<V>, Listener<V>) {
+    let mut robot = Robot::<V>::new(1);
+    for (vertex, &steps) in (0..).zip(labels) {
+        robot.filter.map.add_vertex(Fingerprint::from_steps(steps).expect("in range")).expect("there is room");
+        if vertex > 0 {
+            robot.filter.map.add_edge(vertex - 1, vertex);
+        }
+    }
+    let mut listener = Listener::new();
+    robot.place(&mut Random(0)).iter().for_each(|frame| listener.hear(frame));
+    (robot, listener)
+}
+
+#[test]
+fn a_merge_and_new_numbers_take_one_message_and_what_the_merge_itself_changes() {
+    let (mut robot, mut listener) = chain(&[100, 200, 300, 400]);
+    // Vertices 3 and 1 are one now; 0 and 2 change places. The chain 0-1-2-3 becomes a star around 1.
+    robot.filter.names = vec![Some(2), Some(1), Some(0), Some(1)];
+    robot.filter.map.clear();
+    for steps in [300, 200, 100] {
+        robot.filter.map.add_vertex(Fingerprint::from_steps(steps).expect("in range")).expect("there is room");
+    }
+    robot.filter.map.observe(1, Fingerprint::from_steps(400).expect("in range"));
+    robot.filter.map.add_edge(0, 1);
+    robot.filter.map.add_edge(1, 2);
+    let mut told = Vec::new();
+    let update = robot.update();
+    robot.reporter.update(&robot.filter, &update, |message| {
+        told.push(*message);
+        listener.hear(&frame(&mut robot.encoder, message));
+        Ok(())
+    });
+    let Message::Renamed(renamed) = told[0] else { panic!("{told:?}") };
+    assert_eq!(renamed.names.as_slice(), [2, 1, 0, 1]);
+    assert_eq!(told[1], Message::Vertex { vertex: 1, radius_mm: 600, visits: 2 });
+    assert!(matches!(told[2], Message::Map { vertices: 3, edges: 2, .. }), "{told:?}");
+    assert!(listener.picture.is_converged() && same(&listener.picture, &robot.filter.map));
+}
+
+#[test]
+fn everything_that_was_heard_of_a_vertex_follows_its_new_number() {
+    let (mut robot, mut listener) = chain(&[100, 200, 300, 400]);
+    robot.filter.location = 2;
+    robot.filter.worst = WorstNgram { distance_mm: 50, length: 3, newest_age: 1, vertices: [3, 2, 1, 0, 0, 0, 0] };
+    robot.place(&mut Random(0)).iter().for_each(|frame| listener.hear(frame));
+    let rename = |listener: &mut Listener<V>, robot: &mut Robot<V>, names: &[u8]| {
+        let renamed = Renamed { place_index: 2, names: List::new(names.iter().copied()) };
+        listener.hear(&frame(&mut robot.encoder, &Message::Renamed(renamed)));
+    };
+    let likely = |listener: &Listener<V>| -> Vec<(u8, u16)> {
+        let belief = listener.picture.belief().expect("it was told");
+        belief.places.as_slice().iter().map(|&PlaceProbability { vertex, permille }| (vertex, permille)).collect()
+    };
+    assert_eq!(likely(&listener), [(2, 667), (1, 167), (3, 167)]);
+    // 1 and 3 are one now, with number 0; 0 has number 1.
+    rename(&mut listener, &mut robot, &[1, 0, 2, 0]);
+    assert_eq!(listener.picture.location().map(|location| location.vertex), Some(2));
+    assert_eq!(likely(&listener), [(2, 667), (0, 334)]);
+    assert_eq!(listener.picture.worst().map(|worst| worst.vertices), Some(List::new([0, 2, 0])));
+    assert_eq!(listener.picture.edges().collect::<Vec<_>>(), [(0, 1), (0, 2)]);
+    assert_eq!(listener.picture.row(0).map(|row| row.radius_mm), Some(400));
+    assert_eq!(listener.picture.vertices(), 3);
+    assert!(!listener.picture.is_converged());
+    // The vertex of the location is gone, and with it what was said of it.
+    rename(&mut listener, &mut robot, &[0, 1, 255]);
+    assert_eq!((listener.picture.location(), listener.picture.worst()), (None, None));
+    assert_eq!(likely(&listener), [(0, 334)]);
+    assert_eq!(listener.picture.vertices(), 2);
+}
+
+#[test]
+fn a_listener_that_lost_the_new_numbers_has_the_map_after_one_round_of_the_rolling_picture() {
+    let mut random = Random(5);
+    for _ in 0..200 {
+        let mut robot = Robot::<V>::new(1);
+        let mut listener = Listener::<V>::new();
+        for _ in 0..40 {
+            robot.drive(&mut random);
+            robot.place(&mut random).iter().for_each(|frame| listener.hear(frame));
+        }
+        robot.repair(&mut random);
+        // The frames are numbered; the first is the one that says which vertex is which.
+        robot.place(&mut random).iter().skip(1).for_each(|frame| listener.hear(frame));
+        for _ in 0..robot.filter.map.vertices() + 4 {
+            robot.tick(&mut random).iter().for_each(|frame| listener.hear(frame));
+        }
+        assert!(listener.picture.is_converged() && same(&listener.picture, &robot.filter.map));
+    }
 }
 
 #[test]
@@ -115,14 +208,15 @@ fn a_late_listener_has_everything_after_one_round_of_the_rolling_picture() {
             robot.tick(&mut random);
         }
         let mut listener = Listener::<V>::new();
-        for _ in 0..robot.map.vertices() + 3 {
-            assert!(!listener.picture.is_converged() || same(&listener.picture, &robot.map));
+        for _ in 0..robot.filter.map.vertices() + 4 {
+            assert!(!listener.picture.is_converged() || same(&listener.picture, &robot.filter.map));
             for frame in robot.tick(&mut random) {
                 listener.hear(&frame);
             }
         }
-        assert!(listener.picture.is_converged() && same(&listener.picture, &robot.map), "joined at {joined_at}");
-        assert_eq!(listener.picture.location().map(|location| location.vertex), Some(robot.location));
+        assert!(listener.picture.is_converged() && same(&listener.picture, &robot.filter.map), "joined at {joined_at}");
+        assert_eq!(listener.picture.location().map(|location| location.vertex), Some(robot.filter.location));
+        assert_eq!(listener.picture.belief(), Some(Belief::of(&robot.filter, robot.place_index - 1)));
         assert_eq!(listener.picture.fault(FaultKind::BusError), 1);
         for _ in 0..TICKS_PER_HELLO {
             for frame in robot.tick(&mut random) {
@@ -142,11 +236,7 @@ fn hold_to_its_word(seed: u64, refused_percent: usize, mut line: impl FnMut(&mut
     let mut listener = Listener::<V>::new();
     let (mut ticks, mut converged) = (0, 0);
     for _ in 0..200 {
-        if random.happens(20) {
-            robot.change_hypothesis(&mut random)
-        } else {
-            robot.drive(&mut random)
-        }
+        robot.change(&mut random);
         let mut frames = robot.place(&mut random);
         // A frame that nobody loses closes the update: silence alone tells a listener nothing.
         let update = robot.update();
@@ -157,11 +247,11 @@ fn hold_to_its_word(seed: u64, refused_percent: usize, mut line: impl FnMut(&mut
         }
         listener.hear(&[0]);
         listener.hear(closing);
-        assert!(!listener.picture.is_converged() || same(&listener.picture, &robot.map), "seed {seed}");
+        assert!(!listener.picture.is_converged() || same(&listener.picture, &robot.filter.map), "seed {seed}");
         for _ in 0..30 {
             for frame in robot.tick(&mut random) {
                 listener.hear(&line(&mut random, frame));
-                assert!(!listener.picture.is_converged() || same(&listener.picture, &robot.map), "seed {seed}");
+                assert!(!listener.picture.is_converged() || same(&listener.picture, &robot.filter.map), "seed {seed}");
             }
             ticks += 1;
             converged += usize::from(listener.picture.is_converged());
@@ -169,12 +259,15 @@ fn hold_to_its_word(seed: u64, refused_percent: usize, mut line: impl FnMut(&mut
     }
     robot.refused_percent = 0;
     listener.hear(&[0]);
-    for _ in 0..robot.map.vertices() + 3 {
+    for _ in 0..robot.filter.map.vertices() + 4 {
         for frame in robot.tick(&mut random) {
             listener.hear(&frame);
         }
     }
-    assert!(listener.picture.is_converged() && same(&listener.picture, &robot.map), "once the line is good again");
+    assert!(
+        listener.picture.is_converged() && same(&listener.picture, &robot.filter.map),
+        "once the line is good again"
+    );
     100 * converged / ticks
 }
 
@@ -217,21 +310,17 @@ fn overtaken_frames_are_ignored_and_the_map_still_comes() {
     let mut robot = Robot::<V>::new(1);
     let mut listener = Listener::<V>::new();
     for _ in 0..200 {
-        if random.happens(20) {
-            robot.change_hypothesis(&mut random)
-        } else {
-            robot.drive(&mut random)
-        }
+        robot.change(&mut random);
         let mut frames = robot.place(&mut random);
         for _ in 0..frames.len() / 4 {
             let first = random.below(frames.len() - 1);
             frames.swap(first, first + 1);
         }
         frames.iter().for_each(|frame| listener.hear(frame));
-        for _ in 0..robot.map.vertices() + 3 {
+        for _ in 0..robot.filter.map.vertices() + 4 {
             robot.tick(&mut random).iter().for_each(|frame| listener.hear(frame));
         }
-        assert!(listener.picture.is_converged() && same(&listener.picture, &robot.map));
+        assert!(listener.picture.is_converged() && same(&listener.picture, &robot.filter.map));
     }
 }
 
@@ -254,13 +343,13 @@ fn a_robot_that_starts_anew_begins_with_an_empty_picture() {
 fn a_map_of_64_vertices_arrives_whole() {
     let mut random = Random(62);
     let mut robot = Robot::<64>::new(1);
-    while robot.map.vertices() < 64 {
+    while robot.filter.map.vertices() < 64 {
         robot.drive(&mut random);
     }
     for (a, b) in (0..64).flat_map(|a| (0..64).map(move |b| (a, b))) {
-        robot.map.add_edge(a, b);
+        robot.filter.map.add_edge(a, b);
     }
     let mut listener = Listener::<64>::new();
     robot.place(&mut random).iter().for_each(|frame| listener.hear(frame));
-    assert!(listener.picture.is_converged() && same(&listener.picture, &robot.map));
+    assert!(listener.picture.is_converged() && same(&listener.picture, &robot.filter.map));
 }

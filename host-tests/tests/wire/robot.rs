@@ -2,7 +2,10 @@
 
 use super::frame;
 use toposlam::wire::{Capacities, Encoder, Hello, Message, QueueFull, Reporter};
-use toposlam::{FaultCounters, FaultKind, Fingerprint, Map, Update, WeightFactors};
+use toposlam::{
+    ConfigError, FaultCounters, FaultKind, Filter, FilterCapacities, Fingerprint, Map, Observation, Update,
+    WeightFactors, WorstNgram,
+};
 
 pub(crate) const TICKS_PER_HELLO: u16 = 20;
 
@@ -31,14 +34,72 @@ impl Random {
     }
 }
 
+/// A filter that believes what it is told to.
+#[derive(Clone)]
+pub(crate) struct Believer<const V: usize> {
+    pub(crate) map: Map<V>,
+    /// The number of each vertex of the map before, now.
+    pub(crate) names: Vec<Option<u8>>,
+    pub(crate) location: u8,
+    pub(crate) worst: WorstNgram,
+    faults: FaultCounters,
+}
+
+impl<const V: usize> Filter<V> for Believer<V> {
+    type Config = ();
+
+    const UNSTARTED: Self =
+        Self { map: Map::new(), names: Vec::new(), location: 0, worst: WorstNgram::NONE, faults: FaultCounters::new() };
+
+    fn capacities((): &()) -> FilterCapacities {
+        FilterCapacities { hypotheses: 10, history: 256, ngram_length: 5 }
+    }
+
+    fn start(&mut self, (): (), _: u64) -> Result<(), ConfigError> {
+        Ok(())
+    }
+
+    fn observe(&mut self, _: Observation) -> Update {
+        unreachable!("the tests change the map themselves")
+    }
+
+    fn map(&self) -> &Map<V> {
+        &self.map
+    }
+
+    fn faults(&self) -> &FaultCounters {
+        &self.faults
+    }
+
+    /// Two thirds for the location, the rest among the vertices beside it.
+    fn place_probability_q16(&self, vertex: u8) -> u32 {
+        match vertex.abs_diff(self.location) {
+            0 => 43_691,
+            1 => 10_923,
+            _ => 0,
+        }
+    }
+
+    fn map_probability_q16(&self) -> u32 {
+        1 << 15
+    }
+
+    fn renamed(&self, before: u8) -> Option<u8> {
+        self.names.get(usize::from(before)).copied().unwrap_or(Some(before))
+    }
+
+    fn worst(&self) -> WorstNgram {
+        self.worst
+    }
+}
+
 /// A robot whose map changes at random, and the frames it sends.
 pub(crate) struct Robot<const V: usize> {
-    pub(crate) map: Map<V>,
+    pub(crate) filter: Believer<V>,
     pub(crate) faults: FaultCounters,
     pub(crate) reporter: Reporter<V>,
     pub(crate) encoder: Encoder,
     pub(crate) place_index: u32,
-    pub(crate) location: u8,
     /// The share of messages that the transmit queue refuses, in percent.
     pub(crate) refused_percent: usize,
 }
@@ -56,49 +117,110 @@ impl<const V: usize> Robot<V> {
         let mut reporter = Reporter::new();
         reporter.start(Hello::new(boot, 1, capacities), TICKS_PER_HELLO);
         Self {
-            map: Map::new(),
+            filter: Believer::UNSTARTED,
             faults: FaultCounters::new(),
             reporter,
             encoder: Encoder::new(0),
             place_index: 0,
-            location: 0,
             refused_percent: 0,
         }
     }
 
     /// The map changes as it does from place to place: a new vertex or a known one, one new edge, one more visit.
     pub(crate) fn drive(&mut self, random: &mut Random) {
-        let from = self.location;
-        let known = self.map.vertices();
-        self.location = if known == 0 || random.happens(30) {
-            self.map.add_vertex(random.fingerprint()).unwrap_or(from)
+        let Believer { map, location, names, .. } = &mut self.filter;
+        names.clear();
+        let from = *location;
+        let known = map.vertices();
+        *location = if known == 0 || random.happens(30) {
+            map.add_vertex(random.fingerprint()).unwrap_or(from)
         } else {
             let vertex = random.below(known.into()) as u8;
-            self.map.observe(vertex, random.fingerprint());
+            map.observe(vertex, random.fingerprint());
             vertex
         };
         if known > 0 {
-            self.map.add_edge(from, self.location);
+            map.add_edge(from, *location);
+        }
+        self.name_a_worst(random);
+    }
+
+    /// Another hypothesis becomes the best one: a map of another size with other labels and edges, whose vertices have
+    /// nothing to do with those before.
+    pub(crate) fn change_hypothesis(&mut self, random: &mut Random) {
+        let Believer { map, location, names, .. } = &mut self.filter;
+        names.clear();
+        map.clear();
+        for _ in 0..=random.below(V) {
+            map.add_vertex(random.fingerprint()).expect("there is room");
+        }
+        let vertices = usize::from(map.vertices());
+        for _ in 0..random.below(2 * vertices) {
+            map.add_edge(random.below(vertices) as u8, random.below(vertices) as u8);
+        }
+        *location = random.below(vertices) as u8;
+        self.name_a_worst(random);
+    }
+
+    /// The map is repaired: its vertices get other numbers, some are merged, some are gone, some are new, and an edge is
+    /// drawn or forgotten.
+    pub(crate) fn repair(&mut self, random: &mut Random) {
+        let Believer { map, location, names, .. } = &mut self.filter;
+        let before = *map;
+        let old = before.vertices();
+        // Where each vertex of the new map comes from, in random order.
+        let mut origins: Vec<Option<u8>> = (0..old).filter(|_| !random.happens(15)).map(Some).collect();
+        if origins.len() < V && random.happens(50) || origins.is_empty() {
+            origins.push(None);
+        }
+        for last in (1..origins.len()).rev() {
+            origins.swap(last, random.below(last + 1));
+        }
+        *names = (0..old)
+            .map(|vertex| match origins.iter().position(|&origin| origin == Some(vertex)) {
+                Some(now) => Some(now as u8),
+                None if random.happens(50) => Some(random.below(origins.len()) as u8),
+                None => None,
+            })
+            .collect();
+        map.clear();
+        for &origin in &origins {
+            let label = origin.and_then(|vertex| before.label(vertex)).unwrap_or(random.fingerprint());
+            map.add_vertex(label).expect("there is room");
+        }
+        for (a, b) in before.edges().filter(|_| !random.happens(5)) {
+            if let (Some(a), Some(b)) = (names[usize::from(a)], names[usize::from(b)])
+                && a != b
+            {
+                map.add_edge(a, b);
+            }
+        }
+        let vertices = usize::from(map.vertices());
+        map.add_edge(random.below(vertices) as u8, random.below(vertices) as u8);
+        *location = names.get(usize::from(*location)).copied().flatten().unwrap_or(0);
+        self.name_a_worst(random);
+    }
+
+    /// One of the three things that happen to a map.
+    pub(crate) fn change(&mut self, random: &mut Random) {
+        match random.below(10) {
+            0 | 1 => self.change_hypothesis(random),
+            2 | 3 => self.repair(random),
+            _ => self.drive(random),
         }
     }
 
-    /// Another hypothesis becomes the best one: a map of another size with other labels and edges.
-    pub(crate) fn change_hypothesis(&mut self, random: &mut Random) {
-        self.map.clear();
-        for _ in 0..=random.below(V) {
-            self.map.add_vertex(random.fingerprint()).expect("there is room");
-        }
-        let vertices = usize::from(self.map.vertices());
-        for _ in 0..random.below(2 * vertices) {
-            self.map.add_edge(random.below(vertices) as u8, random.below(vertices) as u8);
-        }
-        self.location = random.below(vertices) as u8;
+    fn name_a_worst(&mut self, random: &mut Random) {
+        let vertices = self.filter.map.vertices().into();
+        let walk: [u8; 7] = std::array::from_fn(|_| random.below(vertices) as u8);
+        let length = random.below(8) as u8;
+        self.filter.worst = WorstNgram { distance_mm: 200, length, newest_age: 9, vertices: walk };
     }
 
     pub(crate) fn update(&self) -> Update {
         Update {
             place_index: self.place_index,
-            vertex: self.location,
+            vertex: self.filter.location,
             is_new: false,
             consistency_mm: 40,
             factors: WeightFactors { ln_label_q16: -1, ln_consistency_q16: -2, ln_size_q16: -3 },
@@ -112,17 +234,20 @@ impl<const V: usize> Robot<V> {
         let update = self.update();
         self.place_index += 1;
         let mut frames = Vec::new();
-        let Self { map, reporter, encoder, refused_percent, .. } = self;
-        reporter.update(map, &update, |message| queue(encoder, message, random.happens(*refused_percent), &mut frames));
-        assert!(frames.len() <= 2 * V + 3, "{} frames in one update", frames.len());
+        let Self { filter, reporter, encoder, refused_percent, .. } = self;
+        reporter
+            .update(filter, &update, |message| queue(encoder, message, random.happens(*refused_percent), &mut frames));
+        assert!(frames.len() <= 2 * V + 6, "{} frames in one update", frames.len());
         frames
     }
 
     /// The frames of a tick.
     pub(crate) fn tick(&mut self, random: &mut Random) -> Vec<Vec<u8>> {
         let mut frames = Vec::new();
-        let Self { map, faults, reporter, encoder, refused_percent, .. } = self;
-        reporter.tick(map, faults, |message| queue(encoder, message, random.happens(*refused_percent), &mut frames));
+        let Self { filter, faults, reporter, encoder, refused_percent, .. } = self;
+        reporter.tick(&filter.map, faults, |message| {
+            queue(encoder, message, random.happens(*refused_percent), &mut frames)
+        });
         assert!(frames.len() <= FaultKind::ALL.len() + 2);
         frames
     }

@@ -2,14 +2,16 @@
 
 use toposlam::Fingerprint;
 use toposlam::ring::Echo;
-use toposlam::wire::{Capacities, Echoes, Evidence, Health, Hello, Location, Message, Row};
+use toposlam::wire::{
+    Belief, Capacities, Echoes, Evidence, Health, Hello, List, Location, Message, PlaceProbability, Renamed, Row, Worst,
+};
 
 /// A plausible message of every kind, in the order of their numbers.
 pub(crate) fn typical() -> Vec<Message> {
     let capacities = Capacities {
         vertices: 16,
         hypotheses: 10,
-        history: 256,
+        history: 400,
         ngram_length: 5,
         fingerprint_step_mm: Fingerprint::STEP_MM as u8,
         sonars: 16,
@@ -42,6 +44,18 @@ pub(crate) fn typical() -> Vec<Message> {
             worst_update_us: 9_800,
         }),
         Message::Ring { frame_index: 5310, echoes: Echoes::new(&ring) },
+        Message::Belief(Belief {
+            place_index: 42,
+            map_permille: 815,
+            places: List::new([(3, 962), (5, 31)].map(|(vertex, permille)| PlaceProbability { vertex, permille })),
+        }),
+        Message::Renamed(Renamed { place_index: 42, names: List::new([0, 1, 255, 2, 3, 1]) }),
+        Message::Worst(Worst {
+            place_index: 42,
+            distance_mm: 84,
+            newest_age: 17,
+            vertices: List::new([3, 7, 4, 7, 3]),
+        }),
     ]
 }
 
@@ -83,5 +97,17 @@ pub(crate) fn largest() -> Vec<Message> {
             worst_update_us: WORD,
         }),
         Message::Ring { frame_index: WORD, echoes: Echoes::new(&[Echo::Range { range_mm: SHORT }; Echoes::MAX]) },
+        Message::Belief(Belief {
+            place_index: WORD,
+            map_permille: SHORT,
+            places: List::new([PlaceProbability { vertex: BYTE, permille: SHORT }; 8]),
+        }),
+        Message::Renamed(Renamed { place_index: WORD, names: List::new([BYTE; 64]) }),
+        Message::Worst(Worst {
+            place_index: WORD,
+            distance_mm: SHORT,
+            newest_age: SHORT,
+            vertices: List::new([BYTE; 7]),
+        }),
     ]
 }

@@ -30,8 +30,10 @@ fn the_samples_hold_every_message_in_the_order_of_its_number() {
         .iter()
         .map(|message| describe(message).split([' ', '(']).nth(1).unwrap_or_default().to_owned())
         .collect();
-    let expected =
-        ["Hello", "Place", "Map", "Vertex", "Edge", "Location", "Evidence", "Row", "Fault", "Health", "Ring"];
+    let expected = [
+        "Hello", "Place", "Map", "Vertex", "Edge", "Location", "Evidence", "Row", "Fault", "Health", "Ring", "Belief",
+        "Renamed", "Worst",
+    ];
     assert_eq!(names, expected);
     for (number, message) in typical().iter().enumerate() {
         assert!(describe(message).starts_with(&format!("{number} ")));

@@ -3,12 +3,12 @@
 use std::path::PathBuf;
 
 use anyhow::Context;
-use clap::Args;
+use clap::{Args, ValueEnum};
 use indicatif::{ProgressBar, ProgressStyle};
 use toposlam::reference;
 use toposlam::ring::RingFrame;
 use toposlam::wire::map_digest;
-use toposlam_host::mapping::{Mapping, Step};
+use toposlam_host::mapping::{FilterChoice, Mapping, Step};
 use toposlam_host::picture::{Drawing, draw};
 use toposlam_host::recording::fault_lines;
 use toposlam_host::world::{Journal, Plan, RobotModel, SONARS, Simulation};
@@ -30,6 +30,33 @@ pub(super) struct DriveArguments {
     svg: Option<PathBuf>,
 }
 
+/// Which filter makes the map.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(super) enum FilterArgument {
+    /// The robust filter, which the firmware runs.
+    Robust,
+    /// The filter of the paper.
+    Paper,
+}
+
+impl From<FilterArgument> for FilterChoice {
+    fn from(argument: FilterArgument) -> Self {
+        match argument {
+            FilterArgument::Robust => Self::Robust,
+            FilterArgument::Paper => Self::Paper,
+        }
+    }
+}
+
+/// What the drive tells the filter besides the frames of the ring.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(super) enum Hints {
+    /// Nothing.
+    None,
+    /// Whether the robot turned back at the place before.
+    Turn,
+}
+
 fn noise_factor(text: &str) -> Result<f64, String> {
     let factor = text.parse().map_err(|error| format!("{error}"))?;
     if (0.0..=100.0).contains(&factor) { Ok(factor) } else { Err("must be 0 to 100".to_owned()) }
@@ -41,22 +68,24 @@ pub(super) struct Drive {
     simulation: Simulation,
     journal: Journal,
     mapping: Mapping<SONARS>,
+    hints: Hints,
 }
 
 impl Drive {
-    pub(super) fn start(arguments: &DriveArguments) -> anyhow::Result<Self> {
+    pub(super) fn start(arguments: &DriveArguments, filter: FilterChoice, hints: Hints) -> anyhow::Result<Self> {
         let plan = load_plan(&arguments.plan)?;
         let model = RobotModel::default().with_noise(arguments.noise);
         let simulation = Simulation::new(&plan, model, arguments.seed)?;
         let journal = Journal::new(simulation.true_map());
-        Ok(Self { plan, simulation, journal, mapping: Mapping::start(&reference::MAPPER)? })
+        let mapping = Mapping::start(reference::RING, filter)?;
+        Ok(Self { plan, simulation, journal, mapping, hints })
     }
 
     /// Drives on by one frame and maps it; gives a step when the robot has just been at a place.
     pub(super) fn advance(&mut self) -> Option<(RingFrame<SONARS>, Option<Step>)> {
         let (frame, truth) = self.simulation.next()?;
         self.journal.drive(&truth);
-        let step = self.mapping.observe(&frame);
+        let step = self.mapping.observe(&frame, truth.turn.filter(|_| self.hints == Hints::Turn));
         if let Some(step) = &step {
             self.journal.detect(&step.place);
         }
@@ -69,7 +98,7 @@ impl Drive {
 
     /// Prints how the drive went and how right the map is, and draws the picture if one is wanted.
     pub(super) fn summarise(&self, arguments: &DriveArguments) -> anyhow::Result<()> {
-        let Self { plan, simulation, journal, mapping } = self;
+        let Self { plan, simulation, journal, mapping, .. } = self;
         let detections = journal.detections();
         println!("\n{}: {} places in {} visits", arguments.plan, detections.len(), journal.visits());
         println!("{}", journal.report());

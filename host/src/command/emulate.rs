@@ -6,8 +6,9 @@ use anyhow::{Context, bail, ensure};
 use clap::Args;
 use toposlam::wire::{Decoder, Evidence, Location, Message, Picture, Progress};
 use toposlam_host::emulator::Emulation;
+use toposlam_host::mapping::FilterChoice;
 
-use super::drive::{Drive, DriveArguments, progress_bar};
+use super::drive::{Drive, DriveArguments, Hints, progress_bar};
 
 /// Where `cargo firmware` puts the image.
 const IMAGE: &str = "thumbv7em-none-eabihf/release/robot";
@@ -66,7 +67,8 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
         None => build_firmware()?,
     };
     // The emulator asks for frames on one thread and hands on what it heard on another.
-    let drive = Mutex::new(Drive::start(&arguments.drive)?);
+    // The firmware has no drive that could tell it of turns, so neither has this computer.
+    let drive = Mutex::new(Drive::start(&arguments.drive, FilterChoice::Robust, Hints::None)?);
     let progress = progress_bar(arguments.places)?;
     let mut heard = Heard { decoder: Decoder::new(), picture: Picture::new(), places: Vec::new() };
     let mut printed = 0;
@@ -141,6 +143,8 @@ fn compare(drive: &Drive, heard: &Heard) -> anyhow::Result<()> {
         ensure!(same_location, "the firmware believes to be elsewhere");
         let same_evidence = heard.picture.evidence() == Some(Evidence::from(&step.update));
         ensure!(same_evidence, "the firmware gives other evidence");
+        ensure!(heard.picture.belief() == drive.mapping().belief(), "the firmware gives other probabilities");
+        ensure!(heard.picture.worst() == drive.mapping().worst(), "the firmware names another worst n-gram");
     }
     Ok(())
 }

@@ -5,10 +5,11 @@ use std::path::PathBuf;
 
 use anyhow::Context;
 use clap::Args;
-use toposlam::reference;
-use toposlam::{Map, MapperConfig};
+use toposlam::Map;
 use toposlam_host::mapping::Mapping;
 use toposlam_host::recording::{Ring, fault_lines};
+
+use super::drive::FilterArgument;
 
 /// Arguments of `toposlam replay`.
 #[derive(Args)]
@@ -18,6 +19,9 @@ pub(crate) struct Arguments {
     /// The ring's description (TOML); the one of the SCITOS G5 robot is built in as `scitos-g5`.
     #[arg(long)]
     ring: PathBuf,
+    /// The filter that makes the map.
+    #[arg(long, value_enum, default_value_t = FilterArgument::Robust)]
+    filter: FilterArgument,
 }
 
 pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
@@ -33,20 +37,18 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     let frames = ring.read(recording).with_context(|| format!("recording {}", arguments.recording.display()))?;
 
     // A smaller ring leaves slots of the frame without a sensor; they are dead in every frame.
-    let mut mapping = Mapping::start(&MapperConfig {
-        geometry: ring.geometry(),
-        place: reference::PLACE,
-        filter: reference::FILTER,
-        seed: reference::SEED,
-        boot: 0,
-    })?;
+    let mut mapping = Mapping::start(ring.geometry(), arguments.filter.into())?;
     for frame in &frames {
-        if let Some(step) = mapping.observe(frame) {
+        if let Some(step) = mapping.observe(frame, None) {
             println!("{step}");
         }
     }
     println!("\n{} frames, {} places", frames.len(), mapping.steps().len());
-    let path: Vec<String> = mapping.path().iter().map(usize::to_string).collect();
+    let path: Vec<String> = mapping
+        .path()
+        .into_iter()
+        .map(|vertex| vertex.map_or_else(|| "-".to_owned(), |vertex| vertex.to_string()))
+        .collect();
     println!("by the final map the places were: {}", path.join(" "));
     print_map(mapping.map());
     for line in fault_lines(&mapping.faults()) {

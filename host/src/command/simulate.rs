@@ -2,7 +2,7 @@
 
 use clap::Args;
 
-use super::drive::{Drive, DriveArguments, progress_bar};
+use super::drive::{Drive, DriveArguments, FilterArgument, Hints, progress_bar};
 
 /// Arguments of `toposlam simulate`.
 #[derive(Args)]
@@ -15,10 +15,16 @@ pub(crate) struct Arguments {
     /// Stop after this many frames at the latest (10 a second); 0: no limit.
     #[arg(long, default_value_t = 1_000_000)]
     frames: u64,
+    /// The filter that makes the map.
+    #[arg(long, value_enum, default_value_t = FilterArgument::Robust)]
+    filter: FilterArgument,
+    /// What the drive tells the filter besides the frames of the ring.
+    #[arg(long, value_enum, default_value_t = Hints::Turn)]
+    hints: Hints,
 }
 
 pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
-    let mut drive = Drive::start(&arguments.drive)?;
+    let mut drive = Drive::start(&arguments.drive, arguments.filter.into(), arguments.hints)?;
     let progress = progress_bar(arguments.places)?;
     let mut frames = 0;
     while drive.mapping().steps().len() < arguments.places && (arguments.frames == 0 || frames < arguments.frames) {

@@ -5,6 +5,7 @@ use std::f64::consts::PI;
 use rand::{RngExt, SeedableRng};
 use rand_distr::{Distribution, StandardNormal};
 use rand_xoshiro::Xoshiro256PlusPlus;
+use toposlam::Turn;
 use toposlam::ring::RingFrame;
 
 use super::sight::{SONARS, Scene, SonarModel, wrapped};
@@ -35,6 +36,9 @@ pub struct Truth {
     pub pose: Pose,
     /// The true node that the robot is at: in the frame in which it comes by, and while it turns there.
     pub node: Option<usize>,
+    /// What the drive knows of the way to the nearest node, without any odometry: whether the robot turned back or drove
+    /// on at the node before that one; `None` when it has not been at a node before.
+    pub turn: Option<Turn>,
 }
 
 /// How the robot drives and what its sonars are worth. Speeds, rates and times must be above 0.
@@ -115,6 +119,8 @@ pub struct Simulation {
     /// How far along the way the robot is: the leg, and the distance driven on it.
     leg: usize,
     driven_mm: f64,
+    /// How the robot left the node behind it, and the one before that.
+    turns: [Option<Turn>; 2],
     heading_rad: f64,
     at_node: Option<usize>,
     sideways: Drift,
@@ -151,6 +157,7 @@ impl Simulation {
             reversed: false,
             leg,
             driven_mm,
+            turns: [None; 2],
             map,
             at_node: None,
             sideways: Drift(0.0),
@@ -208,6 +215,13 @@ impl Simulation {
         }
     }
 
+    /// How the robot left the node before the nearer end of its way.
+    fn turn(&self) -> Option<Turn> {
+        let length_mm = |way: &[Point]| way.windows(2).map(|ends| ends[0].distance_mm(ends[1])).sum::<f64>();
+        let driven_mm = length_mm(&self.way[..=self.leg]) + self.driven_mm;
+        self.turns[usize::from(2.0 * driven_mm < length_mm(&self.way))]
+    }
+
     /// The node the present way begins at.
     fn node_behind(&self) -> usize {
         self.map.edges[self.edge].nodes[usize::from(self.reversed)]
@@ -230,6 +244,7 @@ impl Simulation {
         let TrueEdge { nodes, way } = &self.map.edges[edge];
         self.way = if reversed { way.iter().rev().copied().collect() } else { way.clone() };
         self.target = nodes[usize::from(!reversed)];
+        self.turns = [Some(if turn_back { Turn::Back } else { Turn::On }), self.turns[0]];
         self.edge = edge;
         self.reversed = reversed;
         self.leg = 0;
@@ -252,7 +267,7 @@ impl Iterator for Simulation {
     fn next(&mut self) -> Option<Self::Item> {
         let pose = self.pose();
         let frame = self.scene.frame(&pose, &self.model.sonar, &mut self.random);
-        let truth = Truth { frame_index: self.frame_index, pose, node: self.at_node };
+        let truth = Truth { frame_index: self.frame_index, pose, node: self.at_node, turn: self.turn() };
         self.frame_index += 1;
         self.step();
         Some((frame, truth))

@@ -10,7 +10,8 @@ use embedded_hal_nb::{nb, serial};
 use static_cell::ConstStaticCell;
 use toposlam::{
     Config, ConfigError, Consistency, Direction, FaultCounters, FaultKind, Fingerprint, FingerprintError, History, Map,
-    MapperError, Ngram, NgramError, NgramLength, NgramTable, NgramsFull, PaperFilter, Prior, VerticesFull,
+    MapperError, Ngram, NgramError, NgramLength, NgramTable, NgramsFull, Observation, PaperFilter, Prior, RobustConfig,
+    RobustFilter, Turn, VerticesFull,
     place::{PlaceConfig, PlaceConfigError, PlaceDetector},
     reference,
     ring::RingGeometry,
@@ -267,6 +268,39 @@ pub(crate) fn filter() {
     black_box((filter.best(), filter.particles(), filter.observed(), filter.faults(), filter.config(), filter.map()));
 }
 
+fn any_turn() -> Option<Turn> {
+    [None, Some(Turn::Back), Some(Turn::On)].opaque().first().copied().flatten()
+}
+
+pub(crate) fn robust_filter() {
+    static FILTER: ConstStaticCell<RobustFilter<10, VERTICES, 400>> = ConstStaticCell::new(RobustFilter::new());
+    static LARGE: ConstStaticCell<RobustFilter<3, 32, 32>> = ConstStaticCell::new(RobustFilter::new());
+    if let Some(filter) = FILTER.try_take() {
+        robust(filter);
+    }
+    if let Some(filter) = LARGE.try_take() {
+        robust(filter);
+    }
+}
+
+fn robust<const N: usize, const V: usize, const HISTORY: usize>(filter: &mut RobustFilter<N, V, HISTORY>) {
+    if let Err(error) = filter.start(RobustConfig::default().opaque(), black_box(1)) {
+        show::<ConfigError>(error);
+    }
+    for _ in 0..black_box(3) {
+        black_box(filter.observe(any_fingerprint()));
+        let observation =
+            Observation { fingerprint: any_fingerprint(), turn: any_turn(), degree: black_box(Some(3)), begins: false };
+        black_box(filter.observe(observation.opaque()));
+        filter.set_localise_only(black_box(true));
+    }
+    black_box((filter.map(), filter.observed(), filter.faults(), filter.renamed(black_box(3)), filter.worst()));
+    black_box((filter.place_probability_q16(black_box(3)), filter.map_probability_q16()));
+    for vertex in filter.path() {
+        black_box(vertex);
+    }
+}
+
 fn any_frame() -> RingFrame<16> {
     RingFrame { echoes: black_box([Echo::Range { range_mm: 1000 }; 16]) }
 }
@@ -295,7 +329,7 @@ pub(crate) fn mapper() {
         show::<MapperError>(error);
     }
     for _ in 0..black_box(9) {
-        black_box(mapper.observe(&any_frame(), &FaultCounters::new().opaque(), any_answer));
+        black_box(mapper.observe(&any_frame(), any_turn(), &FaultCounters::new().opaque(), any_answer));
     }
     black_box((mapper.map(), mapper.filter(), mapper.detector()));
     static REPORTER: ConstStaticCell<Reporter<VERTICES>> = ConstStaticCell::new(Reporter::new());
@@ -336,6 +370,7 @@ pub(crate) fn wire() {
         black_box(edge);
     }
     black_box((picture.hello(), picture.location(), picture.evidence(), picture.health()));
+    black_box((picture.belief(), picture.worst()));
     black_box((picture.neighbours(black_box(3)), picture.fault(FaultKind::BusError.opaque())));
     if let Some(Err(error)) = picture.hello().map(|hello: Hello| hello.check()) {
         show::<HelloError>(error);

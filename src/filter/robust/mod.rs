@@ -13,7 +13,7 @@ mod tally;
 
 pub use config::RobustConfig;
 
-use super::{ConfigError, Update, WeightFactors};
+use super::{ConfigError, Update, WeightFactors, WorstNgram};
 use crate::{FaultCounters, FaultKind, Fingerprint, Map, Observation};
 use beam::Beam;
 use decode::Decoder;
@@ -248,6 +248,11 @@ impl<const N: usize, const V: usize, const HISTORY: usize> RobustFilter<N, V, HI
     /// another has the number of the other.
     pub fn renamed(&self, before: u8) -> Option<u8> {
         Some(before)
+    }
+
+    /// The n-gram of the history that is farthest from every walk of the best map.
+    pub fn worst(&self) -> WorstNgram {
+        WorstNgram::NONE
     }
 
     /// Whether the map is kept as it is: the filter then only tells where the robot is.

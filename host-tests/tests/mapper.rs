@@ -1,0 +1,149 @@
+//! All stages in one: what reaches the filter, and what the listener makes of what is sent.
+
+use toposlam::reference::{self, PaperReference, SONARS, VERTICES};
+use toposlam::wire::{Arrival, Belief, Header, Location, Message, Picture, Worst};
+use toposlam::{
+    ConfigError, FaultCounters, Filter, FilterCapacities, Map, Mapper, MapperConfig, Observation, Turn, Update,
+    WeightFactors, WorstNgram,
+};
+use toposlam_host::world::{Plan, RobotModel, Simulation};
+
+/// A filter that only notes what it is told.
+struct Notes {
+    observations: Vec<Observation>,
+    map: Map<VERTICES>,
+    faults: FaultCounters,
+}
+
+impl Filter<VERTICES> for Notes {
+    type Config = u16;
+
+    const UNSTARTED: Self = Self { observations: Vec::new(), map: Map::new(), faults: FaultCounters::new() };
+
+    fn capacities(&history: &u16) -> FilterCapacities {
+        FilterCapacities { hypotheses: 7, history, ngram_length: 3 }
+    }
+
+    fn start(&mut self, history: u16, _: u64) -> Result<(), ConfigError> {
+        if history == 0 { Err(ConfigError("history")) } else { Ok(()) }
+    }
+
+    fn observe(&mut self, observation: Observation) -> Update {
+        self.observations.push(observation);
+        Update {
+            place_index: self.observations.len() as u32 - 1,
+            vertex: 0,
+            is_new: false,
+            consistency_mm: 0,
+            factors: WeightFactors { ln_label_q16: 0, ln_consistency_q16: 0, ln_size_q16: 0 },
+            lead_q16: 0,
+            distinct: 1,
+        }
+    }
+
+    fn map(&self) -> &Map<VERTICES> {
+        &self.map
+    }
+
+    fn faults(&self) -> &FaultCounters {
+        &self.faults
+    }
+
+    fn place_probability_q16(&self, _: u8) -> u32 {
+        0
+    }
+
+    fn map_probability_q16(&self) -> u32 {
+        0
+    }
+
+    fn renamed(&self, before: u8) -> Option<u8> {
+        Some(before)
+    }
+
+    fn worst(&self) -> WorstNgram {
+        WorstNgram::NONE
+    }
+}
+
+fn config<C>(filter: C) -> MapperConfig<SONARS, C> {
+    MapperConfig { geometry: reference::RING, place: reference::PLACE, filter, seed: 1, boot: 0 }
+}
+
+fn simulation() -> Simulation {
+    Simulation::new(&Plan::built_in("office").unwrap(), RobotModel::default(), 3).unwrap()
+}
+
+#[test]
+fn the_filter_hears_of_radius_degree_and_turn() {
+    let mut mapper = Mapper::<SONARS, VERTICES, Notes>::new();
+    assert!(mapper.start(&config(0)).is_err());
+    mapper.start(&config(99)).unwrap();
+    let mut expected = Vec::new();
+    let mut hello = None;
+    for (frame, truth) in simulation() {
+        let send = |message: &Message| {
+            if let Message::Hello(said) = message {
+                hello = Some(*said);
+            }
+            Ok(())
+        };
+        if let Some((place, _)) = mapper.observe(&frame, truth.turn, &FaultCounters::new(), send) {
+            expected.push(Observation {
+                fingerprint: place.fingerprint,
+                turn: truth.turn,
+                degree: place.degree,
+                begins: false,
+            });
+        }
+        if expected.len() == 12 {
+            break;
+        }
+    }
+    assert_eq!(mapper.filter().observations, expected);
+    assert!(expected.iter().any(|observation| observation.turn == Some(Turn::Back)));
+    assert!(expected.iter().any(|observation| observation.degree == Some(3)));
+    let capacities = hello.unwrap().capacities;
+    assert_eq!((capacities.hypotheses, capacities.history, capacities.ngram_length), (7, 99, 3));
+}
+
+/// A listener to the whole run has what the filter believes, after every place.
+fn a_listener_has_what_the_filter_believes<F: Filter<VERTICES>>(settings: F::Config) {
+    let mut mapper = Box::new(Mapper::<SONARS, VERTICES, F>::new());
+    mapper.start(&config(settings)).unwrap();
+    let mut picture = Picture::<VERTICES>::new();
+    let mut sequence = 0;
+    let mut places = 0;
+    for (frame, truth) in simulation() {
+        let seen = mapper.observe(&frame, truth.turn, &FaultCounters::new(), |message| {
+            picture.apply(Header { sequence, arrival: Arrival::InOrder }, message);
+            sequence = sequence.wrapping_add(1);
+            Ok(())
+        });
+        let Some((_, update)) = seen else { continue };
+        let filter = mapper.filter();
+        assert!(picture.is_converged(), "place {places}");
+        assert!(picture.edges().eq(filter.map().edges()), "place {places}");
+        assert_eq!(picture.location(), Some(Location::from(&update)));
+        assert_eq!(picture.belief(), Some(Belief::of(filter, places)));
+        assert_eq!(picture.worst(), Some(Worst::of(filter, places)));
+        let belief = picture.belief().unwrap();
+        assert!((1..=1000).contains(&belief.map_permille), "{belief:?}");
+        let certain: u16 = belief.places.as_slice().iter().map(|place| place.permille).sum();
+        assert!((1..=1004).contains(&certain), "{belief:?}");
+        places += 1;
+        if places == 40 {
+            break;
+        }
+    }
+}
+
+#[test]
+fn a_listener_has_what_the_robust_filter_believes() {
+    a_listener_has_what_the_filter_believes::<reference::Filter>(reference::FILTER);
+}
+
+#[test]
+fn a_listener_has_what_the_paper_s_filter_believes() {
+    a_listener_has_what_the_filter_believes::<PaperReference>(reference::PAPER_FILTER);
+}
