@@ -122,6 +122,16 @@ impl<const V: usize> Map<V> {
         Ok(vertex)
     }
 
+    /// Adds a vertex with a label that so many fingerprints were seen for; the label stays when the number is 0.
+    pub(crate) fn add_known_vertex(&mut self, fingerprint: Fingerprint, visits: u32) -> Result<u8, VerticesFull> {
+        let vertex = self.add_vertex(fingerprint)?;
+        if let Some(label) = self.labels.get_mut(usize::from(vertex)) {
+            let visits = visits.clamp(1, Label::FULL);
+            *label = Label { sum_steps: u32::from(fingerprint.steps()) * visits, visits };
+        }
+        Ok(vertex)
+    }
+
     /// Takes one more fingerprint into the label of a vertex; nothing happens for a vertex the map does not have.
     pub fn observe(&mut self, vertex: u8, fingerprint: Fingerprint) {
         let slot = usize::from(vertex);

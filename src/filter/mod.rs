@@ -31,6 +31,19 @@ pub struct Update {
     pub distinct: u8,
 }
 
+impl Update {
+    /// What a filter tells that was never started.
+    pub(crate) const NONE: Self = Self {
+        place_index: 0,
+        vertex: 0,
+        is_new: false,
+        consistency_mm: 0,
+        factors: WeightFactors::ONE,
+        lead_q16: 0,
+        distinct: 0,
+    };
+}
+
 /// The three factors of a weight (Eq. 6), as logarithms in units of 2⁻¹⁶ nats.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct WeightFactors {

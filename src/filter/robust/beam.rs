@@ -76,6 +76,17 @@ impl<const N: usize, const V: usize, const T: usize> Beam<N, V, T> {
         }
     }
 
+    /// Forgets all hypotheses but the best one.
+    pub(super) fn keep_best(&mut self) {
+        self.len = self.len.min(1);
+    }
+
+    /// The score that a new hypothesis has to exceed.
+    pub(super) fn threshold(&self, wanted: usize) -> f32 {
+        let worst = self.get(self.len.saturating_sub(1)).filter(|_| self.len >= wanted.min(N));
+        worst.map_or(f32::NEG_INFINITY, Hypothesis::score)
+    }
+
     /// Restores the order by score.
     pub(super) fn sort(&mut self) {
         let Self { slots, order, len } = self;
@@ -92,34 +103,43 @@ impl<const N: usize, const V: usize, const T: usize> Beam<N, V, T> {
         }
     }
 
-    /// Takes the newest observation, number `index` of the record: of all predictions of all hypotheses the best
-    /// `wanted` distinct ones live on. Tells whether a map that was full lacked a vertex it wanted.
+    /// Takes the newest observation, number `index` of the record: of all predictions of all hypotheses the best `wanted`
+    /// distinct ones live on. When the map is `fixed` they differ in the place alone. Tells whether the best hypothesis
+    /// would have had another vertex if there had been room. Cost: O(N · V) predictions.
     pub(super) fn grow(
         &mut self,
         prices: &Prices,
         record: &Record<T>,
-        index: usize,
-        entry: Entry,
+        (index, entry): (usize, Entry),
         wanted: usize,
+        fixed: bool,
     ) -> bool {
         let mut chosen = [NONE; N];
         let mut count = 0;
         let wanted = wanted.min(N);
-        let mut full = false;
+        let mut missed = f32::NEG_INFINITY;
         for &slot in self.order.iter().take(self.len) {
             let Some(parent) = self.slots.get(usize::from(slot)) else { continue };
-            full |= usize::from(parent.vertices) == V;
-            let last = parent.vertices.min(V as u8 - 1);
-            for vertex in 0..=last {
+            let vertices = if fixed { parent.vertices } else { parent.vertices + 1 };
+            for vertex in 0..vertices {
                 // A place is never its own neighbour, unless there is no other.
-                if vertex == parent.place && !entry.begins() && last > 0 {
+                if vertex == parent.place && !entry.begins() && vertices > 1 {
                     continue;
                 }
-                let (gain, key) = parent.gain(prices, record, index, entry, vertex);
-                let candidate = Candidate { score: parent.score() + gain, gain, key, parent: slot, vertex };
-                insert(&mut chosen, &mut count, wanted, candidate);
+                let (gain, key) = if fixed {
+                    parent.arrival(prices, record, index, entry, vertex)
+                } else {
+                    parent.gain(prices, record, index, entry, vertex)
+                };
+                let score = parent.score() + gain;
+                if usize::from(vertex) == V {
+                    missed = missed.max(score);
+                } else {
+                    insert(&mut chosen, &mut count, wanted, Candidate { score, gain, key, parent: slot, vertex });
+                }
             }
         }
+        let lacks_room = count > 0 && chosen.first().is_some_and(|best| missed > best.score);
         let mut children = [0_u8; N];
         for candidate in chosen.iter().take(count) {
             if let Some(children) = children.get_mut(usize::from(candidate.parent)) {
@@ -148,14 +168,18 @@ impl<const N: usize, const V: usize, const T: usize> Beam<N, V, T> {
             if let (Some(hypothesis), Some(taken)) =
                 (self.slots.get_mut(usize::from(candidate.parent)), taken.get_mut(usize::from(candidate.parent)))
             {
-                hypothesis.extend(prices, record, index, entry, candidate.vertex, candidate.gain);
+                if fixed {
+                    hypothesis.arrive(index, candidate.vertex, candidate.gain);
+                } else {
+                    hypothesis.extend(prices, record, index, entry, candidate.vertex, candidate.gain);
+                }
                 *taken = true;
             }
         }
         let free = (0..).zip(&taken).filter(|(_, taken)| !**taken).map(|(slot, _)| slot);
         self.order.iter_mut().skip(count).zip(free).for_each(|(order, slot)| *order = slot);
         self.len = count;
-        full
+        lacks_room
     }
 
     /// Takes in a hypothesis: in place of the one with the same map and place if it is better than that, else in a free

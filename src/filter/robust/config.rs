@@ -3,51 +3,30 @@
 use crate::filter::ConfigError;
 
 /// The parameters of the robust filter. The defaults were chosen on random families of environments (docs/evaluation.md).
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct RobustConfig {
     /// How many distinct hypotheses are kept, 1 to the filter's capacity. Default 10.
     pub hypotheses: u8,
     /// A first guess at the standard deviation of a fingerprint in millimetres, 1 to 1000. Default 30; the filter then
     /// estimates it from its best map.
     pub noise_mm: u16,
-    /// How many repair moves are tried at each place, 0 to 255. Default 6.
+    /// How many repair moves are tried at each place, 0 to 255. Default 2; more are made by `RobustFilter::polish`, in
+    /// the time between two places.
     pub moves: u8,
     /// How often a turn hint is wrong, in thousandths, 1 to 500. Default 20.
     pub wrong_turn_permille: u16,
     /// How often a degree is wrong, in thousandths, 1 to 500. Default 100.
     pub wrong_degree_permille: u16,
-    /// Shape of the inverse-gamma prior.
-    pub shape: f32,
-    /// Price of a vertex in nats.
-    pub vertex_price: f32,
-    /// Price of an edge in nats.
-    pub edge_price: f32,
-    /// Price of an edge that is not firm in decoding.
-    pub new_edge_price: f32,
-    /// Weight of the surplus, experiment.
-    pub soft: u8,
-    /// Whether the noise is estimated.
-    pub adapt: u8,
-    /// weight.
-    pub weight: f32,
 }
 
 impl RobustConfig {
     /// The defaults.
-    pub const DEFAULT: Self = Self {
-        hypotheses: 10,
-        noise_mm: 30,
-        moves: 6,
-        wrong_turn_permille: 20,
-        wrong_degree_permille: 100,
-        shape: 2.0,
-        vertex_price: -1.0,
-        edge_price: 1.5,
-        new_edge_price: 3.0,
-        soft: 1,
-        adapt: 15,
-        weight: 1.0,
-    };
+    pub const DEFAULT: Self =
+        Self { hypotheses: 10, noise_mm: 30, moves: 2, wrong_turn_permille: 20, wrong_degree_permille: 100 };
+
+    /// What a filter holds before it is started: all zero.
+    pub(super) const UNSET: Self =
+        Self { hypotheses: 0, noise_mm: 0, moves: 0, wrong_turn_permille: 0, wrong_degree_permille: 0 };
 
     /// Checks every field for a filter with room for `capacity` hypotheses.
     ///

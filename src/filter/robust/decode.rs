@@ -3,7 +3,7 @@
 
 use super::hypothesis::{Hypothesis, NOWHERE};
 use super::lattice::{Column, Model, WIDTH};
-use super::prices::Prices;
+use super::prices::{NEW_EDGE, Prices};
 use super::record::Record;
 
 /// Where the best ways to one vertex of a column come from: two slots of the column before, and for each slot of the
@@ -17,11 +17,10 @@ struct Back {
 
 type Cells = [[f32; WIDTH]; WIDTH];
 
-/// The working memory of the decoder: `11 · WIDTH` bytes a place.
+/// The working memory of the decoder: `2 · WIDTH` bytes a place.
 #[derive(Clone, Debug)]
 pub(super) struct Decoder<const T: usize> {
     backs: [[u16; WIDTH]; T],
-    vertices: [[u8; WIDTH]; T],
     cells: [Cells; 2],
 }
 
@@ -39,7 +38,7 @@ impl Back {
 
 impl<const T: usize> Decoder<T> {
     pub(super) const fn new() -> Self {
-        Self { backs: [[0; WIDTH]; T], vertices: [[0; WIDTH]; T], cells: [[[0.0; WIDTH]; WIDTH]; 2] }
+        Self { backs: [[0; WIDTH]; T], cells: [[[0.0; WIDTH]; WIDTH]; 2] }
     }
 
     /// Writes the best path into the hypothesis. `allowed` is the bit row of the vertices it may visit, and `jitter` gives
@@ -63,9 +62,6 @@ impl<const T: usize> Decoder<T> {
             for fit in there.fits.iter_mut().take(there.len) {
                 *fit += jitter();
             }
-            if let Some(vertices) = self.vertices.get_mut(index) {
-                *vertices = there.vertices;
-            }
             *next = LOST;
             let begins = entry.begins() || index == 0;
             if begins {
@@ -83,7 +79,7 @@ impl<const T: usize> Decoder<T> {
                     let way = if entry.begins() || hypothesis.before == NOWHERE {
                         ln_start
                     } else {
-                        step(prices, model, hypothesis.before, vertex)
+                        step(model, hypothesis.before, vertex)
                     };
                     if let Some(cell) = next.first_mut().and_then(|row| row.get_mut(slot)) {
                         *cell = base + fit + way;
@@ -113,7 +109,7 @@ impl<const T: usize> Decoder<T> {
                         if returning > straight {
                             turned |= 1 << to_slot;
                         }
-                        let way = step(prices, model, from, to);
+                        let way = step(model, from, to);
                         if let Some(cell) = next.get_mut(slot).and_then(|row| row.get_mut(to_slot)) {
                             *cell = returning.max(straight) + way + fit;
                         }
@@ -130,58 +126,76 @@ impl<const T: usize> Decoder<T> {
         }
         let last = columns.get(1).map_or(0, |column| column.len);
         let (from, at, _) = best_pair(&self.cells[0], last);
-        self.trace(record, hypothesis, (from, at));
+        self.trace(prices, record, model, allowed, hypothesis, (from, at));
     }
 
-    /// Follows the best path back from its last pair of slots.
-    fn trace<const V: usize>(&self, record: &Record<T>, hypothesis: &mut Hypothesis<V, T>, last: (usize, usize)) {
-        let vertex_of = |index: usize, slot: usize| {
-            self.vertices.get(index).and_then(|vertices| vertices.get(slot)).copied().unwrap_or(NOWHERE)
+    /// Follows the best path back from its last pair of slots. The columns are made again, which takes less than their
+    /// memory is worth.
+    fn trace<const V: usize>(
+        &self,
+        prices: &Prices,
+        record: &Record<T>,
+        model: &Model<V>,
+        allowed: u32,
+        hypothesis: &mut Hypothesis<V, T>,
+        last: (usize, usize),
+    ) {
+        let begins = |index: usize| index == 0 || record.get(index).is_some_and(|entry| entry.begins());
+        let back_of = |index: usize, slot: usize| {
+            Back::unpacked(self.backs.get(index).and_then(|backs| backs.get(slot)).copied().unwrap_or(0))
         };
+        let fill = |index: Option<usize>, column: &mut Column| {
+            column.len = 0;
+            if let Some(entry) = index.and_then(|index| record.get(index)) {
+                model.column(prices, entry, allowed, column);
+            }
+        };
+        let mut columns = [Column::EMPTY; 3];
+        let len = record.len();
+        let [here, before, earlier] = &mut columns;
+        fill(len.checked_sub(1), here);
+        fill(len.checked_sub(2), before);
+        fill(len.checked_sub(3), earlier);
         let (mut from, mut at) = last;
-        for index in (0..record.len()).rev() {
-            let vertex = vertex_of(index, at);
+        for index in (0..len).rev() {
+            let [here, before, earlier] = &mut columns;
+            let vertex = here.vertices().get(at).copied().unwrap_or(0);
             if let Some(slot) = hypothesis.path.get_mut(index) {
                 *slot = vertex;
             }
             if index == 0 {
                 return;
             }
-            let begins = |index: usize| index == 0 || record.get(index).is_some_and(|entry| entry.begins());
-            let back_of = |index: usize, slot: usize| {
-                Back::unpacked(self.backs.get(index).and_then(|backs| backs.get(slot)).copied().unwrap_or(0))
-            };
             if begins(index) {
                 let back = back_of(index - 1, 0);
                 (from, at) = (back.best.into(), back.second.into());
-                continue;
-            }
-            // The pair before: `from` is the slot at index − 1, and its own predecessor is wanted.
-            let earlier = if begins(index - 1) {
-                0
             } else {
+                // The pair before: `from` is the slot at index − 1, and its own predecessor is wanted.
                 let back = back_of(index - 1, from);
-                let best_vertex = vertex_of(index - 2, back.best.into());
-                if back.turned >> at & 1 == 1 {
-                    let slots = self.vertices.get(index - 2);
-                    slots.and_then(|slots| slots.iter().position(|&held| held == vertex)).unwrap_or(0)
-                } else if best_vertex == vertex {
+                let slot = if begins(index - 1) {
+                    0
+                } else if back.turned >> at & 1 == 1 {
+                    earlier.position(vertex)
+                } else if earlier.vertices().get(usize::from(back.best)) == Some(&vertex) {
                     back.second.into()
                 } else {
                     back.best.into()
-                }
-            };
-            (from, at) = (earlier, from);
+                };
+                (from, at) = (slot, from);
+            }
+            core::mem::swap(here, before);
+            core::mem::swap(before, earlier);
+            fill(index.checked_sub(3), earlier);
         }
     }
 }
 
 /// ln of the probability of a move in the eyes of the decoder.
-fn step<const V: usize>(prices: &Prices, model: &Model<V>, from: u8, to: u8) -> f32 {
+fn step<const V: usize>(model: &Model<V>, from: u8, to: u8) -> f32 {
     if from == to {
         return f32::NEG_INFINITY;
     }
-    model.ln_exit(from) - if model.is_firm(from, to) { 0.0 } else { prices.new_edge }
+    model.ln_exit(from) - if model.is_firm(from, to) { 0.0 } else { NEW_EDGE }
 }
 
 fn best_pair(cells: &Cells, columns: usize) -> (usize, usize, f32) {

@@ -1,8 +1,9 @@
 //! One hypothesis: which vertex each observation belongs to, and the map and counts that follow from that.
 
-use super::prices::Prices;
+use super::prices::{EDGE, Prices, VERTEX};
 use super::record::{Entry, Record};
 use super::tally::Tally;
+use crate::Map;
 use crate::map::bits;
 
 /// No vertex: before the first place, or where the robot's way is not known.
@@ -10,6 +11,9 @@ pub(super) const NOWHERE: u8 = u8::MAX;
 
 /// The price of a path that stays at one vertex for two places: such a path is never kept.
 const STANDSTILL: f32 = 1e6;
+
+/// What it costs to believe that the robot was carried to another place of a map that is kept as it is, in nats.
+const CARRIED: f32 = 8.0;
 
 /// A loss of evidence by the labels alone that nothing makes up for.
 const HOPELESS: f32 = -30.0;
@@ -132,7 +136,7 @@ impl<const V: usize, const T: usize> Hypothesis<V, T> {
             let is_new_edge = self.row(from) >> (vertex & 31) & 1 == 0;
             gain += prices.exit_evidence(&left, self.degree(from) + u32::from(is_new_edge)) - before;
             if is_new_edge {
-                gain -= prices.edge;
+                gain -= EDGE;
                 degree_then += 1;
                 map_key ^= edge_key(from, vertex);
             }
@@ -145,7 +149,7 @@ impl<const V: usize, const T: usize> Hypothesis<V, T> {
             gain += prices.exit_evidence(&seen, degree_then) - prices.exit_evidence(&self.tally(vertex), degree);
         }
         if is_new {
-            gain -= prices.vertex;
+            gain -= VERTEX;
         }
         (gain, keyed(map_key, vertices, vertex))
     }
@@ -156,6 +160,66 @@ impl<const V: usize, const T: usize> Hypothesis<V, T> {
             0 => false,
             1 => self.before == vertex,
             _ => self.at(index - 2) == vertex,
+        }
+    }
+
+    /// As [`Hypothesis::gain`], for a map that is kept as it is: how well the newest observation fits a vertex, and what the
+    /// way there costs. Where there is no edge the robot may have been carried.
+    pub(super) fn arrival(
+        &self,
+        prices: &Prices,
+        record: &Record<T>,
+        index: usize,
+        entry: Entry,
+        vertex: u8,
+    ) -> (f32, u32) {
+        let tally = self.tally(vertex);
+        let mut seen = tally;
+        seen.include(entry);
+        let fit = prices.label_evidence(&seen) - prices.label_evidence(&tally)
+            + prices.degree(entry.degree(), prices.likely_degree(&tally, self.degree(vertex)));
+        let way = if self.place == NOWHERE || entry.begins() {
+            -ln(self.vertices)
+        } else if self.is_edge(self.place, vertex) {
+            let ways = prices.likely_degree(&self.tally(self.place), self.degree(self.place));
+            self.hint(prices, record, index, entry, vertex) - libm::logf(ways as f32)
+        } else {
+            -ln(self.vertices) - CARRIED
+        };
+        (fit + way, keyed(self.map_key, self.vertices, vertex))
+    }
+
+    /// Takes the newest observation as one of a vertex of a map that is kept as it is.
+    pub(super) fn arrive(&mut self, index: usize, vertex: u8, gain: f32) {
+        self.evidence += gain;
+        if let Some(slot) = self.path.get_mut(index) {
+            *slot = vertex;
+        }
+        self.place = vertex;
+    }
+
+    pub(super) fn is_edge(&self, a: u8, b: u8) -> bool {
+        self.row(a) >> (b & 31) & 1 == 1
+    }
+
+    /// What is known of the map alone identifies it, wherever the robot is.
+    pub(super) fn map_key(&self) -> u32 {
+        keyed(self.map_key, self.vertices, 0)
+    }
+
+    /// A hypothesis that knows a map and has seen nothing yet.
+    pub(super) fn know(&mut self, map: &Map<V>, deviation_steps: f32) {
+        self.clear();
+        self.vertices = map.vertices();
+        for vertex in 0..map.vertices() {
+            let slot = usize::from(vertex);
+            if let (Some(settled), Some(row), Some(label)) =
+                (self.settled.get_mut(slot), self.settled_neighbours.get_mut(slot), map.label(vertex))
+            {
+                *settled = Tally::known(label, map.visits(vertex).min(u32::from(u16::MAX)) as u16, deviation_steps);
+                // A loop says that the place is its own neighbour, which no path of this filter uses.
+                *row = map.neighbours(vertex) as u32 & !(1 << (vertex & 31));
+            }
         }
     }
 
@@ -263,17 +327,21 @@ impl<const V: usize, const T: usize> Hypothesis<V, T> {
 
     /// The evidence from the counts.
     pub(super) fn total(&self, prices: &Prices) -> f32 {
-        let mut total = self.hints
-            - f32::from(self.vertices) * prices.vertex
-            - self.edges() as f32 * prices.edge
-            - f32::from(self.starts) * ln(self.vertices.max(1));
+        self.factors(prices).iter().sum()
+    }
+
+    /// The factors of the evidence: of the labels, of the moves between places, and of the size of the map.
+    pub(super) fn factors(&self, prices: &Prices) -> [f32; 3] {
+        let mut labels = 0.0;
+        let mut moves = self.hints - f32::from(self.starts) * ln(self.vertices.max(1));
         for (vertex, tally) in (0..self.vertices).zip(&self.tallies) {
-            if self.row(vertex) >> (vertex & 31) & 1 == 1 {
-                total -= STANDSTILL;
+            labels += prices.label_evidence(tally);
+            moves += prices.exit_evidence(tally, self.degree(vertex));
+            if self.is_edge(vertex, vertex) {
+                moves -= STANDSTILL;
             }
-            total += prices.label_evidence(tally) + prices.exit_evidence(tally, self.degree(vertex));
         }
-        total
+        [labels, moves, -(f32::from(self.vertices) * VERTEX + self.edges() as f32 * EDGE)]
     }
 
     fn renumber(&mut self, len: usize) {
@@ -354,9 +422,9 @@ impl<const V: usize, const T: usize> Hypothesis<V, T> {
         for neighbour in bits(u64::from(row_a & row_b)) {
             let tally = self.tally(neighbour);
             let degree = self.degree(neighbour);
-            gain += prices.edge + prices.exit_evidence(&tally, degree - 1) - prices.exit_evidence(&tally, degree);
+            gain += EDGE + prices.exit_evidence(&tally, degree - 1) - prices.exit_evidence(&tally, degree);
         }
-        gain + prices.vertex + f32::from(self.starts) * (ln(self.vertices) - ln(self.vertices.max(2) - 1))
+        gain + VERTEX + f32::from(self.starts) * (ln(self.vertices) - ln(self.vertices.max(2) - 1))
     }
 
     /// Makes one vertex of two in everything but the numbers of the others; a path that visits both in a row then stays.

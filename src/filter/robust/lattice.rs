@@ -1,7 +1,7 @@
 //! What a decoder needs of a hypothesis: how well each vertex explains a place, and what a move costs.
 
 use super::hypothesis::{Hypothesis, NOWHERE};
-use super::prices::{Prices, digamma};
+use super::prices::{Prices, SHAPE, digamma};
 use super::record::{Entry, Record};
 
 /// How many vertices are considered for one place: those that explain its label best.
@@ -126,7 +126,7 @@ impl<const V: usize> Model<V> {
             let slot = usize::from(vertex);
             let tally = hypothesis.tally(vertex);
             let visits = f32::from(tally.visits);
-            let shape = prices.shape + 0.5 * (visits - 1.0).max(0.0);
+            let shape = SHAPE + 0.5 * (visits - 1.0).max(0.0);
             let scale = prices.scale + 0.5 * tally.scatter();
             self.has_degrees |= tally.knows_degrees();
             let ways = prices.likely_degree(&tally, hypothesis.degree(vertex));

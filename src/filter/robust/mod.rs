@@ -1,4 +1,10 @@
 //! The robust filter: distinct hypotheses with a collapsed evidence, repaired by moves.
+//!
+//! A hypothesis says of every observation which vertex it belongs to; map, labels and counts follow from that. Its evidence
+//! integrates the mean and variance of every label out and takes each move as a uniform choice among the edges of its
+//! vertex, so that an edge prices the past anew; vertices and edges have a price. To it comes what the other paths of the
+//! same map add. A place extends every hypothesis in every way and keeps the best distinct ones; moves then merge, split,
+//! unfold and decode them, because what one place decided wrongly no later place can take back otherwise.
 
 mod beam;
 mod config;
@@ -6,14 +12,20 @@ mod decode;
 mod forward;
 mod hypothesis;
 mod lattice;
+mod merges;
 mod moves;
+mod names;
+mod noise;
 mod prices;
 mod record;
+mod splits;
 mod tally;
+mod worst;
 
 pub use config::RobustConfig;
 
 use super::{ConfigError, Update, WeightFactors, WorstNgram};
+use crate::map::bits;
 use crate::{FaultCounters, FaultKind, Fingerprint, Map, Observation};
 use beam::Beam;
 use decode::Decoder;
@@ -21,20 +33,51 @@ use forward::Forward;
 use hypothesis::Hypothesis;
 use lattice::{Model, Weighing};
 use moves::Workshop;
+use names::Names;
 use prices::Prices;
 use rand_core::SeedableRng;
 use rand_xoshiro::Xoshiro128PlusPlus;
 use record::Record;
 
-/// How many places lie between two estimates of the noise.
-const NOISE_EVERY: u32 = 10;
+/// The noise is estimated at every fifth place at first, later at every tenth.
+const NOISE_FROM: u32 = 10;
+const NOISE_OFTEN_UNTIL: u32 = 40;
 
-/// The robust filter.
+/// One in the unit of probabilities.
+const ONE_Q16: f32 = 65536.0;
+
+/// The largest lead that is told, in nats.
+const LEAD_MAX: f32 = 15.0;
+
+/// The robust filter with at most `N` hypotheses, maps of at most `V` vertices (`V` ≤ 32), and the newest `HISTORY` places
+/// as evidence that moves can still explain in another way; what is older counts as it was decided.
+///
+/// The filter is const-constructed to zero, so that a `static` of it lies in `.bss`, and set up in place by
+/// [`RobustFilter::start`]. Memory: about `(N + 1) · (HISTORY + 48 · V + 32) + 20 · HISTORY + 60 · V + 1200` bytes.
+/// The same observations, seed and calls of [`RobustFilter::polish`] give the same result on every target.
+///
+/// ```
+/// use toposlam::{Fingerprint, RobustConfig, RobustFilter};
+///
+/// let mut filter = RobustFilter::<10, 16, 400>::new();
+/// filter.start(RobustConfig::default(), 1)?;
+/// for radius_mm in [1200, 2200, 1204, 2196, 1200] {
+///     let update = filter.observe(Fingerprint::from_radius_mm(radius_mm)?);
+///     filter.polish();
+///     assert_eq!(update.place_index + 1, filter.observed());
+/// }
+/// assert_eq!(filter.map().vertices(), 2);
+/// assert!(filter.path().eq([0, 1, 0, 1, 0]));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Clone, Debug)]
 pub struct RobustFilter<const N: usize, const V: usize, const HISTORY: usize> {
     config: RobustConfig,
     seed: u64,
     observed: u32,
+    /// How many moves were made since the newest place.
+    polished: u32,
+    localise_only: bool,
     prices: Prices,
     record: Record<HISTORY>,
     beam: Beam<N, V, HISTORY>,
@@ -42,17 +85,28 @@ pub struct RobustFilter<const N: usize, const V: usize, const HISTORY: usize> {
     model: Model<V>,
     decoder: Decoder<HISTORY>,
     forward: Forward<V>,
+    names: Names<V, HISTORY>,
     map: Map<V>,
+    worst: WorstNgram,
+    belief_q16: [u32; V],
+    map_probability_q16: u32,
     faults: FaultCounters,
 }
 
 impl<const N: usize, const V: usize, const HISTORY: usize> RobustFilter<N, V, HISTORY> {
-    /// A filter that is yet to be started.
+    /// A filter that is yet to be set up by [`RobustFilter::start`]; before that, observations are lost.
     pub const fn new() -> Self {
+        const {
+            assert!(N >= 1 && N <= 255, "a filter has 1 to 255 hypotheses");
+            assert!(V >= 2 && V <= 32, "a map has 2 to 32 vertices: a row is one u32");
+            assert!(HISTORY >= 8 && HISTORY <= 16384, "a history holds 8 to 16384 places");
+        }
         Self {
-            config: RobustConfig::DEFAULT,
+            config: RobustConfig::UNSET,
             seed: 0,
             observed: 0,
+            polished: 0,
+            localise_only: false,
             prices: Prices::new(),
             record: Record::new(),
             beam: Beam::new(),
@@ -60,7 +114,11 @@ impl<const N: usize, const V: usize, const HISTORY: usize> RobustFilter<N, V, HI
             model: Model::new(),
             decoder: Decoder::new(),
             forward: Forward::new(),
+            names: Names::new(),
             map: Map::new(),
+            worst: WorstNgram::NONE,
+            belief_q16: [0; V],
+            map_probability_q16: 0,
             faults: FaultCounters::new(),
         }
     }
@@ -68,21 +126,52 @@ impl<const N: usize, const V: usize, const HISTORY: usize> RobustFilter<N, V, HI
     /// Forgets everything and starts anew with a configuration and a seed.
     ///
     /// # Errors
-    /// [`ConfigError`] names the first field that is out of its range.
+    /// [`ConfigError`] names the first field that is out of its range; the filter goes on as it was.
     pub fn start(&mut self, config: RobustConfig, seed: u64) -> Result<(), ConfigError> {
         config.check(N)?;
         self.config = config;
         self.seed = seed;
         self.observed = 0;
+        self.polished = 0;
+        self.localise_only = false;
         self.prices.configure(&config);
         self.record.clear();
         self.beam.clear();
+        self.names.clear();
         self.map.clear();
+        self.worst = WorstNgram::NONE;
+        self.belief_q16 = [0; V];
+        self.map_probability_q16 = 0;
         self.faults = FaultCounters::new();
         Ok(())
     }
 
-    /// Takes the next place.
+    /// As [`RobustFilter::start`], with a map that is known already: its labels count as many visits as it says, with the
+    /// configured noise. The robot may be at any of its vertices.
+    ///
+    /// # Errors
+    /// As [`RobustFilter::start`].
+    pub fn start_with_map(&mut self, config: RobustConfig, seed: u64, map: &Map<V>) -> Result<(), ConfigError> {
+        self.start(config, seed)?;
+        self.draft.know(map, f32::from(config.noise_mm) / f32::from(Fingerprint::STEP_MM));
+        self.draft.recount(&self.prices, &self.record);
+        self.beam.begin_with(&self.draft);
+        self.map = *map;
+        Ok(())
+    }
+
+    /// Whether the map is kept as it is from now on: the filter then only tells where the robot is, notices by itself when
+    /// it was carried elsewhere, and makes no moves. The places seen meanwhile count as evidence when mapping goes on.
+    pub fn set_localise_only(&mut self, localise_only: bool) {
+        if localise_only && !self.localise_only {
+            self.beam.keep_best();
+        }
+        self.localise_only = localise_only;
+    }
+
+    /// Takes the next place, makes the configured number of moves, and publishes the best map.
+    ///
+    /// Cost: N · (V + 1) predictions, and for each move and once more some passes over the record, each O(HISTORY · V).
     pub fn observe(&mut self, observation: impl Into<Observation>) -> Update {
         let mut observation: Observation = observation.into();
         observation.begins |= self.observed == 0;
@@ -90,173 +179,199 @@ impl<const N: usize, const V: usize, const HISTORY: usize> RobustFilter<N, V, HI
             self.faults.count(FaultKind::HistoryFull);
             let record = &self.record;
             self.beam.each(|hypothesis| hypothesis.settle_oldest(record));
+            self.names.drop_oldest();
             self.record.drop_oldest();
         }
         let index = self.record.len();
         self.record.push(&observation);
         let wanted = usize::from(self.config.hypotheses);
-        if let Some(entry) = self.record.get(index) {
-            self.beam.grow(&self.prices, &self.record, index, entry, wanted);
+        if let Some(entry) = self.record.get(index)
+            && self.beam.grow(&self.prices, &self.record, (index, entry), wanted, self.localise_only)
+        {
+            self.faults.count(FaultKind::VerticesFull);
         }
-        let place_seed = self.seed.wrapping_add(u64::from(self.observed).wrapping_mul(0x9E37_79B9_7F4A_7C15));
-        let mut random = Xoshiro128PlusPlus::seed_from_u64(place_seed);
-        for k in 0..self.config.soft {
-            self.soften(if k % 2 == 0 { 0 } else { self.observed as usize % self.beam.len().max(1) });
-            self.beam.sort();
-        }
-        for number in 0..self.config.moves {
-            self.repair(number, &mut random);
+        self.polished = 0;
+        if self.localise_only {
+            self.notice_carriage(index);
+        } else {
+            for _ in 0..self.config.moves {
+                self.polish();
+            }
         }
         self.observed = self.observed.wrapping_add(1);
-        if self.config.adapt > 0
-            && self.observed >= 10
-            && self.observed.is_multiple_of(if self.observed < 40 { 5 } else { NOISE_EVERY })
-        {
+        let often = if self.observed < NOISE_OFTEN_UNTIL { 5 } else { 10 };
+        if !self.localise_only && self.observed >= NOISE_FROM && self.observed.is_multiple_of(often) {
             self.estimate_noise();
         }
+        self.soften_best();
         self.publish()
     }
 
-    /// Tries one move on a hypothesis, the best one every other time.
-    fn repair(&mut self, number: u8, random: &mut Xoshiro128PlusPlus) {
+    /// Makes one more move on the hypotheses: for the time between two places, in as many slices as there is time for. The
+    /// next [`RobustFilter::observe`] publishes what came out. Cost: at most seven passes over the record.
+    pub fn polish(&mut self) {
+        if self.localise_only || self.record.len() < 3 {
+            return;
+        }
+        let number = u64::from(self.observed) << 16 | u64::from(self.polished & 0xFFFF);
+        let mut random =
+            Xoshiro128PlusPlus::seed_from_u64(self.seed.wrapping_add(number.wrapping_mul(0x9E37_79B9_7F4A_7C15)));
+        let wanted = usize::from(self.config.hypotheses);
         let mut workshop = Workshop {
             prices: &self.prices,
             record: &self.record,
             model: &mut self.model,
             decoder: &mut self.decoder,
             forward: &mut self.forward,
-            random,
+            random: &mut random,
+            threshold: self.beam.threshold(wanted),
         };
-        let rank = if number.is_multiple_of(2) {
+        // The best hypothesis every other time, else one of the better ones.
+        let rank = if self.polished.is_multiple_of(2) {
             0
         } else {
             workshop.below(self.beam.len()).min(workshop.below(self.beam.len()))
         };
+        self.polished = self.polished.wrapping_add(1);
         let Some(hypothesis) = self.beam.get(rank) else { return };
         self.draft.clone_from(hypothesis);
-        if !workshop.change(&mut self.draft) {
-            return;
+        if workshop.change(&mut self.draft) {
+            self.beam.insert(&self.draft, wanted);
         }
-        self.beam.insert(&self.draft, usize::from(self.config.hypotheses));
     }
 
-    /// Computes how much the map of a hypothesis gains from its other paths.
-    fn soften(&mut self, rank: usize) {
-        if self.config.soft == 0 {
-            return;
-        }
-        let Some(hypothesis) = self.beam.get_mut(rank) else { return };
-        self.model.read(&self.prices, &self.record, hypothesis, Weighing::Expected);
-        hypothesis.surplus =
-            self.prices.weight * self.forward.surplus(&self.prices, &self.record, &self.model, hypothesis);
-    }
-
-    /// Takes the scale of the noise from the best map and weighs all hypotheses anew.
-    fn estimate_noise(&mut self) {
+    /// Where no edge leads to the newest place, the robot was carried there.
+    fn notice_carriage(&mut self, index: usize) {
         let Some(best) = self.beam.get(0) else { return };
-        let mut scatter = 0.0;
-        let mut freedom = 0_u32;
-        for tally in best.tallies.iter().take(usize::from(best.vertices)).filter(|tally| tally.visits >= 2) {
-            scatter += tally.scatter();
-            freedom += u32::from(tally.visits) - 1;
+        if index > 0 && !best.is_edge(best.at(index - 1), best.place) {
+            self.record.begin_with_newest();
         }
-        if freedom == 0 {
-            return;
-        }
-        let mut deviation = libm::sqrtf(scatter / freedom as f32);
-        if self.config.adapt > 1 {
-            let mut histogram = [0_u16; 256];
-            let mut pairs = 0_u16;
-            for index in 2..self.record.len() {
-                if let (Some(a), Some(b), Some(c)) =
-                    (self.record.get(index - 2), self.record.get(index - 1), self.record.get(index))
-                {
-                    if b.begins() || c.begins() {
-                        continue;
-                    }
-                    let d = usize::from(a.steps.abs_diff(c.steps));
-                    histogram[d.min(255)] += 1;
-                    pairs += 1;
-                }
+    }
+
+    /// Computes anew how much the best map gains from its other paths, until the best one is up to date, and the distribution
+    /// of the place.
+    fn soften_best(&mut self) {
+        for _ in 0..2 {
+            let Some(best) = self.beam.get_mut(0) else { return };
+            self.model.read(&self.prices, &self.record, best, Weighing::Expected);
+            let surplus = self.forward.surplus(&self.prices, &self.record, &self.model, best);
+            let held = core::mem::replace(&mut best.surplus, prices::SURPLUS_SHARE * surplus);
+            if best.surplus >= held || self.localise_only {
+                return;
             }
-            let mut below = 0;
-            let wanted = f32::from(pairs) * 0.2;
-            let q = histogram
-                .iter()
-                .position(|&n| {
-                    below += n;
-                    f32::from(below) >= wanted
-                })
-                .unwrap_or(255);
-            let estimate = (q as f32 + 0.5) / 0.82;
-            deviation = deviation.min(estimate * f32::from(self.config.adapt) / 10.0);
+            let key = best.key();
+            self.beam.sort();
+            if self.beam.get(0).is_some_and(|now| now.key() == key) {
+                return;
+            }
         }
-        let deviation = deviation.clamp(2.0, 150.0);
+    }
+
+    /// Takes the scale of the noise from what was observed, and weighs all hypotheses anew.
+    fn estimate_noise(&mut self) {
+        let Some(deviation) = self.beam.get(0).and_then(|best| noise::deviation_steps(&self.record, best)) else {
+            return;
+        };
         self.prices.set_noise(deviation);
         let prices = &self.prices;
         self.beam.each(|hypothesis| hypothesis.evidence = hypothesis.total(prices));
         self.beam.sort();
     }
 
+    /// Tells the best map under the numbers that its vertices are known by.
     fn publish(&mut self) -> Update {
+        let Some(best) = self.beam.get(0) else { return Update::NONE };
+        self.names.follow(&self.record, &self.map, best);
         self.map.clear();
-        let mut vertex = 0;
-        if let Some(best) = self.beam.get(0) {
-            vertex = best.place;
-            for tally in best.tallies.iter().take(usize::from(best.vertices)) {
-                let _ = self.map.add_vertex(tally.mean_label());
+        for name in 0..best.vertices {
+            let vertex = (0..best.vertices).find(|&vertex| self.names.name(vertex) == name).unwrap_or(0);
+            let tally = best.tally(vertex);
+            // A map of the same capacity has room for every vertex.
+            let _ = self.map.add_known_vertex(tally.mean_label(), tally.visits.into());
+        }
+        self.belief_q16 = [0; V];
+        for vertex in 0..best.vertices {
+            let name = self.names.name(vertex);
+            for neighbour in bits(best.row(vertex).into()) {
+                self.map.add_edge(name, self.names.name(neighbour));
             }
-            for a in 0..best.vertices {
-                for b in crate::map::bits(u64::from(best.row(a))) {
-                    self.map.add_edge(a, b);
-                }
+            let probability = self.forward.belief.get(usize::from(vertex)).copied().unwrap_or(0.0);
+            if let Some(belief) = self.belief_q16.get_mut(usize::from(name)) {
+                *belief = (probability * ONE_Q16) as u32;
             }
         }
+        self.worst = worst::worst_ngram(&self.record, &self.map, self.names.path());
+        let (mut same, mut all) = (0.0, 0.0);
+        let mut rival = f32::NEG_INFINITY;
+        for hypothesis in self.beam.iter() {
+            let behind = hypothesis.score() - best.score();
+            let weight = libm::expf(behind.min(0.0));
+            all += weight;
+            if hypothesis.map_key() == best.map_key() {
+                same += weight;
+            } else {
+                rival = rival.max(behind);
+            }
+        }
+        self.map_probability_q16 = (same / all * ONE_Q16) as u32;
+        let factors = best.factors(&self.prices);
         Update {
-            place_index: self.observed - 1,
-            vertex,
-            is_new: false,
-            consistency_mm: 0,
-            factors: WeightFactors::ONE,
-            lead_q16: 0,
+            place_index: self.observed.wrapping_sub(1),
+            vertex: self.names.name(best.place),
+            is_new: best.tally(best.place).visits == 1,
+            consistency_mm: self.worst.distance_mm,
+            factors: WeightFactors {
+                ln_label_q16: q16(factors[0]),
+                ln_consistency_q16: q16(factors[1]),
+                ln_size_q16: q16(factors[2]),
+            },
+            lead_q16: q16((-rival).clamp(-LEAD_MAX, LEAD_MAX)),
             distinct: self.beam.len() as u8,
         }
     }
 
-    /// The best map.
+    /// The best map. Its vertices keep their numbers from update to update as far as it goes; see
+    /// [`RobustFilter::renamed`].
     pub fn map(&self) -> &Map<V> {
         &self.map
     }
 
-    /// The vertex of the best map that each of the newest `HISTORY` places was taken for, the oldest first: the path of
-    /// the best hypothesis as it sees the past now.
+    /// The vertex that each of the newest `HISTORY` places was taken for, the oldest first, as the best hypothesis saw the
+    /// past at the last update.
     pub fn path(&self) -> impl Iterator<Item = u8> + '_ {
-        self.beam.get(0).into_iter().flat_map(|best| best.path.iter().copied()).take(self.record.len())
+        self.names.path().iter().copied().take(self.record.len())
     }
 
-    /// The probability that the robot is at a vertex, in units of 2⁻¹⁶.
+    /// The probability that the robot is at a vertex of the best map, given that map, in units of 2⁻¹⁶.
     pub fn place_probability_q16(&self, vertex: u8) -> u32 {
-        if vertex == 0 { 1 << 16 } else { 0 }
+        self.belief_q16.get(usize::from(vertex)).copied().unwrap_or(0)
     }
 
-    /// The probability that the best map is right, relative to its rivals, in units of 2⁻¹⁶.
+    /// The probability that the best map is right, were one of the hypotheses right, in units of 2⁻¹⁶.
     pub fn map_probability_q16(&self) -> u32 {
-        1 << 16
+        self.map_probability_q16
     }
 
     /// For each vertex before the last update its number now; `None` when it is gone. A vertex that was merged into
     /// another has the number of the other.
     pub fn renamed(&self, before: u8) -> Option<u8> {
-        Some(before)
+        self.names.renamed(before)
     }
 
     /// The n-gram of the history that is farthest from every walk of the best map.
     pub fn worst(&self) -> WorstNgram {
-        WorstNgram::NONE
+        self.worst
     }
 
-    /// Whether the map is kept as it is: the filter then only tells where the robot is.
-    pub fn set_localise_only(&mut self, _localise_only: bool) {}
+    /// The logarithm of the evidence of the best hypothesis, and what its map gains from other paths, in nats.
+    pub fn evidence(&self) -> (f32, f32) {
+        self.beam.get(0).map_or((0.0, 0.0), |best| (best.evidence, best.surplus))
+    }
+
+    /// The standard deviation of a fingerprint that the filter works with now, in millimetres.
+    pub fn noise_mm(&self) -> f32 {
+        self.prices.noise_steps() * f32::from(Fingerprint::STEP_MM)
+    }
 
     /// How many places were observed.
     pub fn observed(&self) -> u32 {
@@ -268,33 +383,24 @@ impl<const N: usize, const V: usize, const HISTORY: usize> RobustFilter<N, V, HI
         &self.faults
     }
 
-    /// Score of the best hypothesis (evidence, surplus).
-    pub fn debug_score(&self) -> (f32, f32) {
-        self.beam.get(0).map_or((0.0, 0.0), |best| (best.evidence, best.surplus))
-    }
-
-    /// Scores a given path on the current record, after a search of some moves.
-    pub fn debug_limit(&mut self, path: &[u8], moves: u32) -> (f32, bool) {
-        let Some(best) = self.beam.get(0) else { return (0.0, false) };
-        self.draft.clone_from(best);
-        self.draft.path[..path.len()].copy_from_slice(path);
-        self.draft.vertices = path.iter().max().map_or(0, |last| last + 1);
+    /// Replaces all hypotheses by one that takes the newest places for given vertices, numbered from 0 without gaps, the
+    /// oldest first; tells its score. It is for tests and evaluations: to force a mistake, or to begin a search at the truth.
+    /// Nothing happens when there are not as many vertices as places, or more vertices than a map holds.
+    pub fn assume_path(&mut self, path: &[u8]) -> Option<f32> {
+        let vertices = path.iter().max().map_or(0, |last| last.saturating_add(1));
+        if path.len() != self.record.len() || usize::from(vertices) > V {
+            return None;
+        }
+        self.draft.clear();
+        self.draft.vertices = vertices;
+        for (slot, &vertex) in self.draft.path.iter_mut().zip(path) {
+            *slot = vertex;
+        }
         self.draft.rebuild(&self.prices, &self.record);
-        self.model.read(&self.prices, &self.record, &self.draft, Weighing::Expected);
-        self.draft.surplus =
-            self.prices.weight * self.forward.surplus(&self.prices, &self.record, &self.model, &self.draft);
-        if self.config.soft == 0 {
-            self.draft.surplus = 0.0;
-        }
-        let truth = self.draft.score();
-        let key = self.draft.key();
         self.beam.begin_with(&self.draft);
-        let mut random = Xoshiro128PlusPlus::seed_from_u64(1);
-        for number in 0..moves {
-            self.repair(number as u8, &mut random);
-        }
+        self.soften_best();
         self.publish();
-        (truth, self.beam.get(0).is_some_and(|best| best.key() == key))
+        self.beam.get(0).map(Hypothesis::score)
     }
 }
 
@@ -302,4 +408,9 @@ impl<const N: usize, const V: usize, const HISTORY: usize> Default for RobustFil
     fn default() -> Self {
         Self::new()
     }
+}
+
+/// Nats in units of 2⁻¹⁶; saturates.
+fn q16(nats: f32) -> i32 {
+    (nats * ONE_Q16) as i32
 }

@@ -8,22 +8,31 @@ use crate::{Fingerprint, Turn};
 /// The range of labels on which the mean of a vertex is uniform a priori, in steps: 2 m.
 const LABEL_RANGE_STEPS: f32 = 1000.0;
 
+/// Shape of the inverse-gamma prior of a vertex's variance.
+pub(super) const SHAPE: f32 = 2.0;
+
+/// The price of a vertex. It is negative because a map of K vertices stands for the K! ways to number them.
+pub(super) const VERTEX: f32 = -1.0;
+
+/// The price of an edge: about ln of the odds against an edge in a sparse graph of a dozen vertices.
+pub(super) const EDGE: f32 = 1.5;
+
+/// What the decoder charges for a move along no edge, or along one that was driven once.
+pub(super) const NEW_EDGE: f32 = 3.0;
+
+/// How much of what all paths of a map add to the evidence of its best one counts. At 0 maps that fold look-alike branches
+/// onto each other win, at 1 maps that hold a place twice do; chosen on random families.
+pub(super) const SURPLUS_SHARE: f32 = 0.7;
+
 const HALF_LN_2_PI: f32 = 0.918_938_5;
 
 /// The prices of one run; the scale of the noise changes with what the best map shows.
 #[derive(Clone, Debug)]
 pub(super) struct Prices {
-    /// Shape of the inverse-gamma prior of a vertex's variance.
-    pub(super) shape: f32,
-    /// Scale of that prior, in steps²: shape · (standard deviation)².
+    /// Scale of the inverse-gamma prior of a vertex's variance, in steps²: shape · (standard deviation)².
     pub(super) scale: f32,
     /// What does not depend on the vertex in its label evidence.
     label_constant: f32,
-    pub(super) vertex: f32,
-    pub(super) edge: f32,
-    /// What the decoder charges for an edge that is not established.
-    pub(super) new_edge: f32,
-    pub(super) weight: f32,
     /// ln P of a turn hint that is right, and of one that is wrong.
     turn: [f32; 2],
     /// ln P of a degree that is right, off by one, and off by more.
@@ -32,25 +41,10 @@ pub(super) struct Prices {
 
 impl Prices {
     pub(super) const fn new() -> Self {
-        Self {
-            shape: 0.0,
-            scale: 0.0,
-            label_constant: 0.0,
-            vertex: 0.0,
-            edge: 0.0,
-            new_edge: 0.0,
-            weight: 0.0,
-            turn: [0.0; 2],
-            degree: [0.0; 3],
-        }
+        Self { scale: 0.0, label_constant: 0.0, turn: [0.0; 2], degree: [0.0; 3] }
     }
 
     pub(super) fn configure(&mut self, config: &RobustConfig) {
-        self.shape = config.shape;
-        self.vertex = config.vertex_price;
-        self.edge = config.edge_price;
-        self.weight = config.weight;
-        self.new_edge = config.new_edge_price;
         let wrong = f32::from(config.wrong_turn_permille) / 1000.0;
         self.turn = [libm::logf(1.0 - wrong), libm::logf(wrong)];
         let wrong = f32::from(config.wrong_degree_permille) / 1000.0;
@@ -60,9 +54,14 @@ impl Prices {
 
     /// Takes a new standard deviation of the labels, in steps.
     pub(super) fn set_noise(&mut self, deviation_steps: f32) {
-        self.scale = self.shape * deviation_steps * deviation_steps;
+        self.scale = SHAPE * deviation_steps * deviation_steps;
         self.label_constant =
-            HALF_LN_2_PI - libm::logf(LABEL_RANGE_STEPS) - ln_gamma(self.shape) + self.shape * libm::logf(self.scale);
+            HALF_LN_2_PI - libm::logf(LABEL_RANGE_STEPS) - ln_gamma(SHAPE) + SHAPE * libm::logf(self.scale);
+    }
+
+    /// The standard deviation in force, in steps.
+    pub(super) fn noise_steps(&self) -> f32 {
+        libm::sqrtf(self.scale / SHAPE)
     }
 
     /// ln of the density of all labels seen at a vertex, its mean and variance integrated out.
@@ -71,7 +70,7 @@ impl Prices {
             return 0.0;
         }
         let visits = f32::from(tally.visits);
-        let shape = self.shape + 0.5 * (visits - 1.0);
+        let shape = SHAPE + 0.5 * (visits - 1.0);
         self.label_constant - visits * HALF_LN_2_PI - 0.5 * libm::logf(visits) + ln_gamma(shape)
             - shape * libm::logf(self.scale + 0.5 * tally.scatter())
     }
@@ -108,7 +107,7 @@ impl Prices {
     }
 
     fn degree_evidence(&self, tally: &Tally, ways: u32) -> f32 {
-        let seen = (1..).zip(tally.degrees.iter().skip(1));
+        let seen = (1..).zip(&tally.degrees);
         seen.filter(|(_, count)| **count > 0).map(|(degree, &count)| f32::from(count) * self.degree(degree, ways)).sum()
     }
 

@@ -78,6 +78,13 @@ impl<const T: usize> Record<T> {
         }
     }
 
+    /// Notes that the robot was carried to the newest place.
+    pub(super) fn begin_with_newest(&mut self) {
+        if let Some(hints) = self.len.checked_sub(1).and_then(|newest| self.hints.get_mut(newest)) {
+            *hints |= BEGINS;
+        }
+    }
+
     pub(super) fn get(&self, index: usize) -> Option<Entry> {
         match (self.steps.get(index), self.hints.get(index)) {
             (Some(&steps), Some(&hints)) if index < self.len => Some(Entry { steps, hints }),

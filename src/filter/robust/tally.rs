@@ -1,47 +1,60 @@
 //! What a hypothesis counts at a vertex.
 
-use super::record::Entry;
+use super::record::{DEGREE_MAX, Entry};
 use crate::Fingerprint;
-
-/// Labels are summed relative to this one, the middle of the range.
-const CENTRE_STEPS: i32 = 2048;
 
 /// Counts of what left the record are halved beyond this many visits, so that old places fade.
 const FADE_VISITS: u16 = 512;
 
-/// The sufficient statistics of one vertex.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+/// The sufficient statistics of one vertex: 20 bytes.
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Tally {
-    squares: u64,
-    sum: i32,
+    mean: f32,
+    scatter: f32,
     pub(super) visits: u16,
     /// How many moves left the vertex.
     pub(super) exits: u16,
-    /// How often each degree was seen; the first counts nothing.
-    pub(super) degrees: [u8; 8],
+    /// How often each degree was seen, that of 1 first.
+    pub(super) degrees: [u8; DEGREE_MAX as usize],
 }
 
 impl Tally {
-    pub(super) const NONE: Self = Self { squares: 0, sum: 0, visits: 0, exits: 0, degrees: [0; 8] };
+    pub(super) const NONE: Self =
+        Self { mean: 0.0, scatter: 0.0, visits: 0, exits: 0, degrees: [0; DEGREE_MAX as usize] };
 
+    /// The counts that a known vertex stands for: so many visits with a mean label and a standard deviation, in steps.
+    pub(super) fn known(label: Fingerprint, visits: u16, deviation_steps: f32) -> Self {
+        let visits = visits.clamp(1, FADE_VISITS);
+        let scatter = f32::from(visits - 1) * deviation_steps * deviation_steps;
+        Self { mean: f32::from(label.steps()), scatter, visits, exits: visits, ..Self::NONE }
+    }
+
+    /// Takes in a visit (Welford's update).
     pub(super) fn include(&mut self, entry: Entry) {
-        let label = i32::from(entry.steps) - CENTRE_STEPS;
-        self.sum += label;
-        self.squares += u64::from(label.unsigned_abs().pow(2));
-        self.visits = self.visits.saturating_add(1);
-        if entry.degree() > 0 {
-            if self.degrees.iter().any(|&count| count == u8::MAX) {
+        let Some(visits) = self.visits.checked_add(1) else { return };
+        let off = f32::from(entry.steps) - self.mean;
+        self.mean += off / f32::from(visits);
+        self.scatter += off * (f32::from(entry.steps) - self.mean);
+        self.visits = visits;
+        if let Some(degree) = entry.degree().checked_sub(1) {
+            if self.degrees.contains(&u8::MAX) {
                 self.degrees.iter_mut().for_each(|count| *count /= 2);
             }
-            if let Some(count) = self.degrees.get_mut(usize::from(entry.degree())) {
+            if let Some(count) = self.degrees.get_mut(usize::from(degree)) {
                 *count += 1;
             }
         }
     }
 
+    /// Takes in all that another vertex counted.
     pub(super) fn add(&mut self, other: &Self) {
-        self.squares += other.squares;
-        self.sum += other.sum;
+        if other.visits == 0 {
+            return;
+        }
+        let (here, there) = (f32::from(self.visits), f32::from(other.visits));
+        let off = other.mean - self.mean;
+        self.mean += off * there / (here + there);
+        self.scatter += other.scatter + off * off * here * there / (here + there);
         self.visits = self.visits.saturating_add(other.visits);
         self.exits = self.exits.saturating_add(other.exits);
         for (count, more) in self.degrees.iter_mut().zip(other.degrees) {
@@ -52,8 +65,7 @@ impl Tally {
     /// Halves what was counted when it is more than a vertex needs.
     pub(super) fn fade(&mut self) {
         if self.visits >= FADE_VISITS {
-            self.squares /= 2;
-            self.sum /= 2;
+            self.scatter *= 0.5;
             self.visits /= 2;
             self.exits /= 2;
             self.degrees.iter_mut().for_each(|count| *count /= 2);
@@ -61,22 +73,20 @@ impl Tally {
     }
 
     pub(super) fn knows_degrees(&self) -> bool {
-        u64::from_le_bytes(self.degrees) != 0
+        self.degrees.iter().any(|&count| count > 0)
     }
 
     /// The mean label in steps.
-    pub(super) fn mean(&self) -> f32 {
-        CENTRE_STEPS as f32 + self.sum as f32 / f32::from(self.visits.max(1))
+    pub(super) const fn mean(&self) -> f32 {
+        self.mean
     }
 
     pub(super) fn mean_label(&self) -> Fingerprint {
-        Fingerprint::from_steps(libm::roundf(self.mean()) as u16).unwrap_or(Fingerprint::MAX)
+        Fingerprint::from_steps(libm::roundf(self.mean) as u16).unwrap_or(Fingerprint::MAX)
     }
 
     /// The sum of squared distances of the labels from their mean, in steps².
-    pub(super) fn scatter(&self) -> f32 {
-        let visits = u64::from(self.visits.max(1));
-        let product = i64::from(self.sum).unsigned_abs().pow(2);
-        (visits * self.squares).saturating_sub(product) as f32 / visits as f32
+    pub(super) const fn scatter(&self) -> f32 {
+        self.scatter
     }
 }

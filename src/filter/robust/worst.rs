@@ -1,0 +1,91 @@
+//! The directed distance of Eq. 2 from the history to the map, with the n-gram that carries it.
+//!
+//! The path of a hypothesis shows how far each n-gram is at most: its vertices are a walk. So n-grams are looked at in the
+//! order of that bound, and those whose bound is no more than the distance found already need no look.
+
+use super::record::Record;
+use crate::filter::WorstNgram;
+use crate::map::bits;
+use crate::{Fingerprint, Map};
+
+/// n: how many labels an n-gram has, as in Section IV of the paper.
+pub(super) const LENGTH: usize = 5;
+
+/// How many n-grams are looked at one by one; of further ones the bound is taken.
+const LOOKS: usize = 16;
+
+/// Finds max over the n-grams of the record of min over the walks of the map of Eq. 3: one half of Eq. 2. U-turns in the
+/// history add nothing to it, since the map has the U-turns of its walks too. `path` gives the vertex of each observation.
+/// Cost: O(T) and at most 16 times O(n · V · degree).
+pub(super) fn worst_ngram<const V: usize, const T: usize>(record: &Record<T>, map: &Map<V>, path: &[u8]) -> WorstNgram {
+    let mut residuals = [0_u16; T];
+    for ((entry, &vertex), residual) in record.iter().zip(path).zip(&mut residuals) {
+        *residual = map.label(vertex).map_or(0, |label| entry.steps.abs_diff(label.steps()));
+    }
+    let residual = |index: usize| residuals.get(index).copied().unwrap_or(0);
+    let is_whole = |end: usize| {
+        end + 1 >= LENGTH
+            && (end + 2 - LENGTH..=end).all(|index| record.get(index).is_some_and(|entry| !entry.begins()))
+    };
+    let bound = |end: usize| (end + 1 - LENGTH..=end).map(residual).max().unwrap_or(0);
+    let mut worst = WorstNgram::NONE;
+    let mut found: Option<u16> = None;
+    let mut ceiling = u16::MAX;
+    let mut after = 0;
+    for _ in 0..LOOKS {
+        // The next n-gram by bound; of equal ones the older first.
+        let mut next: Option<(u16, usize)> = None;
+        for end in (0..record.len()).filter(|&end| is_whole(end)) {
+            let bound = bound(end);
+            let is_next = bound < ceiling || bound == ceiling && end > after;
+            if is_next && next.is_none_or(|(largest, _)| bound > largest) {
+                next = Some((bound, end));
+            }
+        }
+        let Some((bound, end)) = next.filter(|&(bound, _)| found.is_none_or(|found| bound > found)) else { break };
+        (ceiling, after) = (bound, end);
+        let labels = core::array::from_fn(|index| record.get(end + 1 + index - LENGTH).map_or(0, |entry| entry.steps));
+        let (distance, walk) = nearest_walk(map, &labels);
+        if found.is_none_or(|found| distance > found) {
+            found = Some(distance);
+            worst.distance_mm = distance.saturating_mul(Fingerprint::STEP_MM);
+            worst.length = LENGTH as u8;
+            worst.newest_age = (record.len() - 1 - end) as u16;
+            worst.vertices.iter_mut().zip(walk).for_each(|(to, vertex)| *to = vertex);
+        }
+    }
+    worst
+}
+
+/// The walk of the map that is nearest to an n-gram in the maximum norm (Eq. 3), and its distance in steps.
+fn nearest_walk<const V: usize>(map: &Map<V>, labels: &[u16; LENGTH]) -> (u16, [u8; LENGTH]) {
+    let mut distances = [0_u16; V];
+    let mut backs = [[0_u8; V]; LENGTH];
+    for (index, (&label, backs)) in labels.iter().zip(&mut backs).enumerate() {
+        let mut next = [u16::MAX; V];
+        for (((vertex, own), next), back) in (0_u8..).zip(map.labels()).zip(&mut next).zip(backs) {
+            let mut arrival = (u16::MAX, vertex);
+            if index == 0 {
+                arrival.0 = 0;
+            } else {
+                for from in bits(map.neighbours(vertex)) {
+                    let distance = distances.get(usize::from(from)).copied().unwrap_or(u16::MAX);
+                    if distance < arrival.0 {
+                        arrival = (distance, from);
+                    }
+                }
+            }
+            *next = arrival.0.max(own.steps().abs_diff(label));
+            *back = arrival.1;
+        }
+        distances = next;
+    }
+    let best = (0_u8..map.vertices()).zip(distances).min_by_key(|&(_, distance)| distance).unwrap_or((0, 0));
+    let mut walk = [0; LENGTH];
+    let mut vertex = best.0;
+    for (slot, backs) in walk.iter_mut().zip(&backs).rev() {
+        *slot = vertex;
+        vertex = backs.get(usize::from(vertex)).copied().unwrap_or(0);
+    }
+    (best.1, walk)
+}
