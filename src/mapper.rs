@@ -61,7 +61,8 @@ impl<const SONARS: usize, const V: usize, F: Filter<V>> Mapper<SONARS, V, F> {
         Ok(())
     }
 
-    /// Takes one frame of the ring; gives the place and the update when the robot has just been at one.
+    /// Takes one frame of the ring; gives the place and the update when the robot has just been at one. The filter uses
+    /// every other frame to polish its map.
     ///
     /// `turn` is what the drive knows of how the robot left the place before the one it may be at, `None` if nothing.
     /// `sonar_faults` are those of the ring's driver so far. Every message goes to `send`, which says whether the transmit
@@ -86,6 +87,9 @@ impl<const SONARS: usize, const V: usize, F: Filter<V>> Mapper<SONARS, V, F> {
             self.reporter.update(&self.filter, &update, &mut send);
             (place, update)
         });
+        if seen.is_none() {
+            self.filter.polish();
+        }
         let mut faults = *sonar_faults;
         faults.add(self.detector.faults());
         faults.add(self.filter.faults());

@@ -116,6 +116,7 @@ struct Costs<const LENGTH: usize> {
 }
 
 type PlaceCosts = Costs<{ PLACES_MM.len() }>;
+type SliceCosts = Costs<{ SLICES * PLACES_MM.len() }>;
 type FrameCosts = Costs<{ FRAMES_MM.len() }>;
 
 impl<const LENGTH: usize> Costs<LENGTH> {
@@ -139,26 +140,32 @@ impl<const LENGTH: usize> Costs<LENGTH> {
             let rank = (LENGTH * percent / 100).min(LENGTH.saturating_sub(1));
             hprintln!("{}_{}: {}", name, quantile, self.values.get(rank).copied().unwrap_or(0));
         }
+        self.held = 0;
     }
 }
+
+/// How many slices of polishing there are between two places. The robot has one for each ring frame, some hundreds.
+const SLICES: usize = 10;
 
 /// What the filter is told of a place.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Told {
-    /// What the robot of today tells: radius and degree.
-    NoTurns,
+    /// The radius alone.
+    Radius,
     /// The turn at the place before as well.
-    Turns,
+    Turn,
+    /// Turn and degree.
+    TurnAndDegree,
 }
 
 fn observation(radius_mm: u16, [turn, degree]: [u8; 2], told: Told) -> Observation {
     let Ok(fingerprint) = Fingerprint::from_radius_mm(radius_mm) else { panic!() };
     let turn = match turn {
-        b'b' if told == Told::Turns => Some(Turn::Back),
-        b'o' if told == Told::Turns => Some(Turn::On),
+        b'b' if told != Told::Radius => Some(Turn::Back),
+        b'o' if told != Told::Radius => Some(Turn::On),
         _ => None,
     };
-    let degree = Some(degree - b'0').filter(|&degree| degree > 0);
+    let degree = Some(degree - b'0').filter(|&degree| degree > 0 && told == Told::TurnAndDegree);
     Observation { turn, degree, ..Observation::new(fingerprint) }
 }
 
@@ -168,7 +175,7 @@ fn run<const V: usize, F: toposlam::Filter<V>>(
     filter: &mut F,
     config: F::Config,
     told: Told,
-    costs: &mut PlaceCosts,
+    (costs, slices): (&mut PlaceCosts, &mut SliceCosts),
     mut then: impl FnMut(&F, &Update),
 ) {
     let Ok(()) = filter.start(config, reference::SEED) else { panic!() };
@@ -177,6 +184,10 @@ fn run<const V: usize, F: toposlam::Filter<V>>(
         let (instructions, update) = clock.measure(|| filter.observe(black_box(observation)));
         costs.push(instructions);
         then(filter, &update);
+        for _ in 0..SLICES {
+            let (instructions, ()) = clock.measure(|| filter.polish());
+            slices.push(instructions);
+        }
     }
 }
 
@@ -224,13 +235,15 @@ fn main() -> ! {
     static FILTERS: ConstStaticCell<Filters> = ConstStaticCell::new(Filters::Robot(Filter::new()));
     static DETECTOR: ConstStaticCell<Detector> = ConstStaticCell::new(Detector::new());
     static REPORTER: ConstStaticCell<Reporter<VERTICES>> = ConstStaticCell::new(Reporter::new());
-    static COSTS: ConstStaticCell<[PlaceCosts; 5]> = ConstStaticCell::new([const { PlaceCosts::new() }; 5]);
+    static COSTS: ConstStaticCell<[PlaceCosts; 6]> = ConstStaticCell::new([const { PlaceCosts::new() }; 6]);
+    static SLICE_COSTS: ConstStaticCell<SliceCosts> = ConstStaticCell::new(Costs::new());
     static DETECTOR_COSTS: ConstStaticCell<FrameCosts> = ConstStaticCell::new(Costs::new());
 
     let Some(core) = cortex_m::Peripherals::take() else { panic!() };
     let clock = &Clock::start(core.SYST);
     let (filters, detector_costs) = (FILTERS.take(), DETECTOR_COSTS.take());
-    let [turn_costs, costs, large_costs, paper_costs, report_costs] = COSTS.take();
+    let [turn_costs, costs, both_costs, large_costs, paper_costs, report_costs] = COSTS.take();
+    let slices = SLICE_COSTS.take();
     let mut wire = Wire { reporter: REPORTER.take(), encoder: Encoder::new(0), costs: report_costs, largest_bytes: 0 };
     let capacities = Filter::capacities(&reference::FILTER);
     let capacities = Capacities {
@@ -245,25 +258,30 @@ fn main() -> ! {
 
     let places_detected = detect(clock, DETECTOR.take(), detector_costs);
     if let Filters::Robot(filter) = filters {
-        run(clock, filter, reference::FILTER, Told::Turns, turn_costs, |_, _| {});
+        run(clock, filter, reference::FILTER, Told::Radius, (costs, slices), |_, _| {});
+        slices.print("robust_instructions_per_slice");
+        run(clock, filter, reference::FILTER, Told::Turn, (turn_costs, slices), |_, _| {});
+        slices.print("robust_turn_instructions_per_slice");
         let report = |filter: &Filter, update: &Update| wire.report(clock, filter, update);
-        run(clock, filter, reference::FILTER, Told::NoTurns, costs, report);
+        run(clock, filter, reference::FILTER, Told::TurnAndDegree, (both_costs, slices), report);
+        slices.print("robust_both_instructions_per_slice");
     }
     *filters = const { Filters::Paper(PaperReference::new()) };
     if let Filters::Paper(filter) = filters {
-        run(clock, filter, reference::PAPER_FILTER, Told::NoTurns, paper_costs, |_, _| {});
+        run(clock, filter, reference::PAPER_FILTER, Told::Radius, (paper_costs, slices), |_, _| {});
     }
     // Of the robot's own stages, before the larger filter, sorting and formatting add to it.
     let stack_bytes = support::stack_high_water_bytes();
     *filters = const { Filters::Large(LargeFilter::new()) };
     if let Filters::Large(filter) = filters {
-        run(clock, filter, LARGE_FILTER, Told::Turns, large_costs, |_, _| {});
+        run(clock, filter, LARGE_FILTER, Told::Turn, (large_costs, slices), |_, _| {});
     }
 
     hprintln!("places: {}", PLACES_MM.len());
     hprintln!("history_places: {}", HISTORY);
     turn_costs.print("robust_turn_instructions_per_place");
     costs.print("robust_instructions_per_place");
+    both_costs.print("robust_both_instructions_per_place");
     large_costs.print("robust_32_turn_instructions_per_place");
     paper_costs.print("history_to_map_instructions_per_place");
     wire.costs.print("report_instructions_per_place");

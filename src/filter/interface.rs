@@ -1,5 +1,6 @@
 //! What the stages around a filter ask of it.
 
+use super::robust::NGRAM_LENGTH;
 use super::{ConfigError, PaperFilter, RobustConfig, RobustFilter, Update, WorstNgram};
 use crate::{Config, FaultCounters, Map, Observation};
 
@@ -36,6 +37,10 @@ pub trait Filter<const V: usize>: Sized {
     /// Takes the next place.
     fn observe(&mut self, observation: Observation) -> Update;
 
+    /// Goes on thinking for one slice of the time between two places; a filter with nothing to think about does nothing.
+    /// The next [`Filter::observe`] tells what came out.
+    fn polish(&mut self) {}
+
     /// The best map.
     fn map(&self) -> &Map<V>;
 
@@ -56,9 +61,6 @@ pub trait Filter<const V: usize>: Sized {
     fn worst(&self) -> WorstNgram;
 }
 
-/// How many labels the n-gram has that the robust filter tells of.
-const ROBUST_NGRAM_LENGTH: u8 = 5;
-
 impl<const N: usize, const V: usize, const HISTORY: usize> Filter<V> for RobustFilter<N, V, HISTORY> {
     type Config = RobustConfig;
 
@@ -68,7 +70,7 @@ impl<const N: usize, const V: usize, const HISTORY: usize> Filter<V> for RobustF
         FilterCapacities {
             hypotheses: config.hypotheses.into(),
             history: HISTORY as u16,
-            ngram_length: ROBUST_NGRAM_LENGTH,
+            ngram_length: NGRAM_LENGTH as u8,
         }
     }
 
@@ -78,6 +80,10 @@ impl<const N: usize, const V: usize, const HISTORY: usize> Filter<V> for RobustF
 
     fn observe(&mut self, observation: Observation) -> Update {
         self.observe(observation)
+    }
+
+    fn polish(&mut self) {
+        self.polish();
     }
 
     fn map(&self) -> &Map<V> {

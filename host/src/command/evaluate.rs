@@ -77,6 +77,16 @@ struct CourseArguments {
     /// What the filter is told besides fingerprints: none, turn, degree or both; missing and wrong are probabilities.
     #[arg(long, value_name = "HINTS[,missing=P,wrong=P]", default_value = "none")]
     hints: Hints,
+    /// How many slices of the time between two places the robust filter uses; on a robot there is one for each ring frame.
+    #[arg(long, value_name = "SLICES", default_value_t = 10)]
+    polish: u32,
+    /// How many slices the robust filter uses after each place of the n-grams of a prior.
+    #[arg(long, value_name = "SLICES", default_value_t = 4)]
+    polish_prior: u32,
+    /// At each check point, also search for so many slices from the true path, and report how often the search leaves it
+    /// for a better map: what no search could do better with this score. 0: no search.
+    #[arg(long, value_name = "SLICES", default_value_t = 0)]
+    from_truth: u32,
     /// How many bits a fingerprint has, 1 to 12.
     #[arg(long, value_name = "B", default_value_t = 12, value_parser = clap::value_parser!(u32).range(1..=12))]
     fingerprint_bits: u32,
@@ -269,6 +279,9 @@ impl CourseArguments {
                 PriorChoice::Exploration => PriorSource::Exploration,
                 PriorChoice::None => PriorSource::None,
             },
+            polish: self.polish,
+            polish_prior: self.polish_prior,
+            search_from_truth: self.from_truth,
             hints: self.hints,
             fingerprint_bits: self.fingerprint_bits,
             ngram_length,

@@ -1,7 +1,7 @@
 //! One filter along one path, and how right its map is at each check point.
 
 use super::{
-    candidate::{Start, VERTICES, prior_table},
+    candidate::{Candidate, Start, VERTICES, prior_table},
     graph::Graph,
     prior::PriorSource,
     run::Settings,
@@ -25,8 +25,6 @@ pub struct PathResult {
     pub vertices_full: u32,
     /// How long the n-grams of the prior took to map.
     pub prior_time: Duration,
-    /// Whether a long search that starts at the true path ends in another map; `None` when there was no search.
-    pub limit: Option<bool>,
 }
 
 /// How right a map is after some places of the path.
@@ -42,7 +40,10 @@ pub struct Judgement {
     pub consistency_mm: u16,
     /// The first place, counted from 1, from which on the map was exact up to now, as far as was looked at.
     pub exact_from: Option<usize>,
-    /// How long the filter took for the places so far.
+    /// Whether a long search that starts at the true path ends in another map, which then has the better score; `None` when
+    /// there was no search.
+    pub leaves_truth: Option<bool>,
+    /// How long the filter took for the places so far, polishing included.
     pub filter_time: Duration,
 }
 
@@ -52,6 +53,7 @@ pub fn judge(trial: &Trial, settings: &Settings, start: Start) -> PathResult {
     let started = Instant::now();
     for visit in trial.mapped_before().iter().flatten() {
         candidate.observe(visit.observation);
+        candidate.polish(settings.polish_prior);
     }
     let prior_time = started.elapsed();
 
@@ -64,6 +66,9 @@ pub fn judge(trial: &Trial, settings: &Settings, start: Start) -> PathResult {
     let mut judgements = Vec::new();
     for (step, visit) in trial.visits.iter().enumerate() {
         let start = Instant::now();
+        if step > 0 {
+            candidate.polish(settings.polish);
+        }
         candidate.observe(visit.observation);
         filter_time += start.elapsed();
 
@@ -89,12 +94,35 @@ pub fn judge(trial: &Trial, settings: &Settings, start: Start) -> PathResult {
                 localised_share: localised[check_point] as f64 / steps as f64,
                 consistency_mm: distance_mm(&map, steps),
                 exact_from,
+                leaves_truth: leaves_truth(&*candidate, &truth, before, settings.search_from_truth),
                 filter_time,
             });
         }
     }
     let vertices_full = candidate.vertices_full();
-    PathResult { exhaustive: trial.exhaustive, judgements, vertices_full, prior_time, limit: None }
+    PathResult { exhaustive: trial.exhaustive, judgements, vertices_full, prior_time }
+}
+
+/// Whether a search of so many slices that starts at the true path ends in a map that is not the true one.
+fn leaves_truth(candidate: &dyn Candidate, truth: &Truth, before: usize, slices: u32) -> Option<bool> {
+    if slices == 0 {
+        return None;
+    }
+    // The filter numbers vertices by first visit.
+    let mut seen = Vec::new();
+    let path: Vec<u8> = truth
+        .classes
+        .iter()
+        .map(|class| {
+            let number = seen.iter().position(|known| known == class).unwrap_or_else(|| {
+                seen.push(*class);
+                seen.len() - 1
+            });
+            u8::try_from(number).unwrap_or(u8::MAX)
+        })
+        .collect();
+    let (map, path) = candidate.search_from(&path, slices)?;
+    Some(!score_map_from(&graph_of(&map), &path, &truth.graph, &truth.classes, before).exact)
 }
 
 fn graph_of(map: &Map<VERTICES>) -> Graph {
@@ -172,6 +200,12 @@ mod tests {
             self.seen += 1;
         }
 
+        fn polish(&mut self, _slices: u32) {}
+
+        fn search_from(&self, _path: &[u8], _slices: u32) -> Option<(Map<VERTICES>, Vec<usize>)> {
+            None
+        }
+
         fn map(&self) -> Map<VERTICES> {
             self.map
         }
@@ -210,6 +244,9 @@ mod tests {
             seed: 1,
             filter: Filter::Robust(RobustConfig::DEFAULT),
             prior,
+            polish: 0,
+            polish_prior: 0,
+            search_from_truth: 0,
             hints: Default::default(),
             fingerprint_bits: 12,
             ngram_length: NgramLength::new(3).unwrap(),

@@ -31,6 +31,12 @@ pub struct SettingsReport {
     pub prior: String,
     /// What the filter was told besides fingerprints, as on the command line.
     pub hints: String,
+    /// How many slices of the time between two places the filter used.
+    pub polish: u32,
+    /// How many slices the filter used after each place of the prior.
+    pub polish_prior: u32,
+    /// How many slices a search from the truth took; 0 without one.
+    pub search_from_truth: u32,
     /// How many bits a fingerprint has.
     pub fingerprint_bits: u32,
     /// `n`.
@@ -78,6 +84,9 @@ impl SettingsReport {
             seed: settings.seed,
             prior: settings.prior.name().into(),
             hints: settings.hints.to_string(),
+            polish: settings.polish,
+            polish_prior: settings.polish_prior,
+            search_from_truth: settings.search_from_truth,
             fingerprint_bits: settings.fingerprint_bits,
             ngram_length: settings.ngram_length.get(),
             filters: filters.iter().map(|&filter| (filter.name(), filter.into())).collect(),
@@ -232,7 +241,7 @@ fn row(case: &Case, settings: &Settings, results: &[PathResult], check_point: us
     let length = settings.lengths[check_point];
     let filter_time: Duration = judged().map(|judgement| judgement.filter_time).sum();
     let prior_time: Duration = results.iter().map(|result| result.prior_time).sum();
-    let limits: Vec<bool> = results.iter().filter_map(|result| result.limit).collect();
+    let limits: Vec<bool> = judged().filter_map(|judgement| judgement.leaves_truth).collect();
     let limit = limits.iter().filter(|&&left_truth| left_truth).count() as f64 / limits.len() as f64;
     let missed = results.iter().filter(|result| !result.exhaustive).count();
     Row {
@@ -262,8 +271,11 @@ fn row(case: &Case, settings: &Settings, results: &[PathResult], check_point: us
 
 impl fmt::Display for Report {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let SettingsReport { seed, prior, hints, fingerprint_bits, ngram_length, filters } = &self.settings;
-        write!(f, "seed {seed}, prior {prior}, hints {hints}, {fingerprint_bits} bits, n = {ngram_length}")?;
+        let SettingsReport { seed, prior, hints, fingerprint_bits, ngram_length, filters, polish, .. } = &self.settings;
+        write!(
+            f,
+            "seed {seed}, prior {prior}, hints {hints}, {fingerprint_bits} bits, n = {ngram_length}, {polish} slices"
+        )?;
         for (name, filter) in filters {
             // The parameters by the names they have in JSON.
             let parameters = serde_json::to_value(filter).map_err(|_| fmt::Error)?;
@@ -275,6 +287,10 @@ impl fmt::Display for Report {
         writeln!(f)?;
         let width = self.rows.iter().map(|row| row.name.chars().count()).max().unwrap_or(0).max("name".len());
         write!(f, "{:<width$} {:<7}{:>6}{:>6}{:>7} {:<12}", "name", "filter", "paths", "T", "exact", "95 %")?;
+        let has_limit = self.rows.iter().any(|row| row.limit.is_some());
+        if has_limit {
+            write!(f, "{:>6}", "left")?;
+        }
         writeln!(
             f,
             "{:>6}{:>9}{:>8}{:>10}{:>15}{:>14}{:>10}  vertices: maps",
@@ -284,7 +300,12 @@ impl fmt::Display for Report {
             let [low, high] = row.exact_interval;
             let interval = format!("{low:.3}-{high:.3}");
             write!(f, "{:<width$} {:<7}{:>6}{:>6}", row.name, row.filter, row.paths, row.length)?;
-            write!(f, "{:>7.3} {interval:<12}{:>6.3}{:>9.3}", row.exact, row.isomorphic, row.edge_f1)?;
+            write!(f, "{:>7.3} {interval:<12}", row.exact)?;
+            if has_limit {
+                let left = row.limit.map_or("-".to_owned(), |share| format!("{share:.3}"));
+                write!(f, "{left:>6}")?;
+            }
+            write!(f, "{:>6.3}{:>9.3}", row.isomorphic, row.edge_f1)?;
             write!(f, "{:>8.3}{:>10.3}", row.location_online, row.location_smoothed)?;
             let Distribution { median, p90 } = row.places_until_exact;
             let place = |place: Option<usize>| place.map_or("never".to_owned(), |place| place.to_string());

@@ -32,6 +32,12 @@ pub struct Settings {
     pub filter: Filter,
     /// What the filter knows before it starts.
     pub prior: PriorSource,
+    /// How many slices of the time between two places the filter uses.
+    pub polish: u32,
+    /// How many slices the filter uses after each place of the n-grams of a prior.
+    pub polish_prior: u32,
+    /// How many slices a search from the truth takes at each check point; 0 for no search.
+    pub search_from_truth: u32,
     /// What the filter is told besides fingerprints.
     pub hints: Hints,
     /// How many bits a fingerprint has, 1 to 12, which is what the filter holds.

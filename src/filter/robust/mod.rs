@@ -23,6 +23,7 @@ mod tally;
 mod worst;
 
 pub use config::RobustConfig;
+pub(super) use worst::LENGTH as NGRAM_LENGTH;
 
 use super::{ConfigError, Update, WeightFactors, WorstNgram};
 use crate::map::bits;
@@ -203,12 +204,17 @@ impl<const N: usize, const V: usize, const HISTORY: usize> RobustFilter<N, V, HI
         if !self.localise_only && self.observed >= NOISE_FROM && self.observed.is_multiple_of(often) {
             self.estimate_noise();
         }
+        self.refresh()
+    }
+
+    /// Tells the best map as [`RobustFilter::observe`] does, without another place: what came out of polishing.
+    pub fn refresh(&mut self) -> Update {
         self.soften_best();
         self.publish()
     }
 
     /// Makes one more move on the hypotheses: for the time between two places, in as many slices as there is time for. The
-    /// next [`RobustFilter::observe`] publishes what came out. Cost: at most seven passes over the record.
+    /// next [`RobustFilter::observe`] or [`RobustFilter::refresh`] publishes what came out. Cost: at most seven passes over the record.
     pub fn polish(&mut self) {
         if self.localise_only || self.record.len() < 3 {
             return;
@@ -398,8 +404,7 @@ impl<const N: usize, const V: usize, const HISTORY: usize> RobustFilter<N, V, HI
         }
         self.draft.rebuild(&self.prices, &self.record);
         self.beam.begin_with(&self.draft);
-        self.soften_best();
-        self.publish();
+        self.refresh();
         self.beam.get(0).map(Hypothesis::score)
     }
 }

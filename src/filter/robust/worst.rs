@@ -9,7 +9,7 @@ use crate::map::bits;
 use crate::{Fingerprint, Map};
 
 /// n: how many labels an n-gram has, as in Section IV of the paper.
-pub(super) const LENGTH: usize = 5;
+pub(in crate::filter) const LENGTH: usize = 5;
 
 /// How many n-grams are looked at one by one; of further ones the bound is taken.
 const LOOKS: usize = 16;

@@ -82,6 +82,12 @@ impl<const N: usize, const WORDS: usize> Candidate for Online<N, WORDS> {
         self.0.advance();
     }
 
+    fn polish(&mut self, _slices: u32) {}
+
+    fn search_from(&self, _path: &[u8], _slices: u32) -> Option<(Map<VERTICES>, Vec<usize>)> {
+        None
+    }
+
     fn map(&self) -> Map<VERTICES> {
         *self.0.filter.map()
     }
@@ -111,6 +117,12 @@ impl<const N: usize, const WORDS: usize> Candidate for Informed<N, WORDS> {
     fn observe(&mut self, observation: Observation) {
         self.particles.filter.observe_with_prior(observation.fingerprint, &mut self.prior);
         self.particles.advance();
+    }
+
+    fn polish(&mut self, _slices: u32) {}
+
+    fn search_from(&self, _path: &[u8], _slices: u32) -> Option<(Map<VERTICES>, Vec<usize>)> {
+        None
     }
 
     fn map(&self) -> Map<VERTICES> {
