@@ -10,7 +10,7 @@ pub struct RobustConfig {
     /// A first guess at the standard deviation of a fingerprint in millimetres, 1 to 1000. Default 30; the filter then
     /// estimates it from its best map.
     pub noise_mm: u16,
-    /// How many repair moves are tried at each place, 0 to 255. Default 2; more are made by `RobustFilter::polish`, in
+    /// How many repair moves are tried at each place, 0 to 255. Default 1; more are made by `RobustFilter::polish`, in
     /// the time between two places.
     pub moves: u8,
     /// How often a turn hint is wrong, in thousandths, 1 to 500. Default 20.
@@ -22,7 +22,7 @@ pub struct RobustConfig {
 impl RobustConfig {
     /// The defaults.
     pub const DEFAULT: Self =
-        Self { hypotheses: 10, noise_mm: 30, moves: 2, wrong_turn_permille: 20, wrong_degree_permille: 100 };
+        Self { hypotheses: 10, noise_mm: 30, moves: 1, wrong_turn_permille: 20, wrong_degree_permille: 100 };
 
     /// What a filter holds before it is started: all zero.
     pub(super) const UNSET: Self =

@@ -56,6 +56,9 @@ impl<const T: usize> Decoder<T> {
         let [cells, next] = &mut self.cells;
         let ln_start = -libm::logf(f32::from(hypothesis.vertices.max(1)));
         let mut second_of_sequence = false;
+        // Where the best way to each slot comes from, when the ways are not told apart.
+        let mut origins = [0_u8; WIDTH];
+        let mut is_together = false;
         for (index, entry) in record.iter().enumerate() {
             let [earlier, here, there] = &mut columns;
             model.column(prices, entry, allowed, there);
@@ -91,11 +94,18 @@ impl<const T: usize> Decoder<T> {
                 // Where each vertex of the column behind stood two places before.
                 let mut earlier_slots = [WIDTH; WIDTH];
                 for (slot, &vertex) in earlier_slots.iter_mut().zip(there.vertices()) {
-                    *slot = if second_of_sequence { WIDTH } else { earlier.position(vertex) };
+                    *slot = if second_of_sequence || is_together { WIDTH } else { earlier.position(vertex) };
                 }
-                let rows = if second_of_sequence { 1 } else { earlier.len };
+                let together = record.forgets_way(index);
+                let mut next_origins = [0_u8; WIDTH];
                 for (slot, &from) in here.vertices().iter().enumerate() {
-                    let (best, second) = two_best(cells, rows, slot);
+                    let (best, second) = if is_together || second_of_sequence {
+                        let origin = origins.get(slot).copied().map_or(0, usize::from);
+                        let score = cells.first().and_then(|row| row.get(slot)).copied().unwrap_or(f32::NEG_INFINITY);
+                        ((origin, score), (origin, score))
+                    } else {
+                        two_best(cells, earlier.len, slot)
+                    };
                     let mut turned = 0;
                     for (to_slot, ((to, fit), &earlier_slot)) in there.iter().zip(&earlier_slots).enumerate() {
                         if to == from {
@@ -110,8 +120,15 @@ impl<const T: usize> Decoder<T> {
                             turned |= 1 << to_slot;
                         }
                         let way = step(model, from, to);
-                        if let Some(cell) = next.get_mut(slot).and_then(|row| row.get_mut(to_slot)) {
-                            *cell = returning.max(straight) + way + fit;
+                        let row = if together { 0 } else { slot };
+                        let score = returning.max(straight) + way + fit;
+                        if let Some(cell) = next.get_mut(row).and_then(|row| row.get_mut(to_slot))
+                            && score > *cell
+                        {
+                            *cell = score;
+                            if let Some(origin) = next_origins.get_mut(to_slot) {
+                                *origin = slot as u8;
+                            }
                         }
                     }
                     let back = Back { best: best.0 as u8, second: second.0 as u8, turned };
@@ -119,7 +136,9 @@ impl<const T: usize> Decoder<T> {
                         *packed = back.packed();
                     }
                 }
+                origins = next_origins;
             }
+            is_together = !begins && record.forgets_way(index);
             second_of_sequence = begins;
             core::mem::swap(cells, next);
             columns.rotate_left(1);

@@ -43,6 +43,7 @@ impl<const V: usize> Forward<V> {
         let mut scale = 1.0_f32;
         let mut on_path = NOWHERE;
         let mut before_path = NOWHERE;
+        let mut rows = 0;
         for (index, (entry, &on_path_now)) in record.iter().zip(&hypothesis.path).enumerate() {
             let [earlier, here, there] = &mut columns;
             model.column(prices, entry, u32::MAX, there);
@@ -83,13 +84,14 @@ impl<const V: usize> Forward<V> {
                 let (ln_on, ln_back) = (prices.turn(hint, false), prices.turn(hint, true));
                 let (on, back) = if hint.is_some() { (libm::expf(ln_on), libm::expf(ln_back)) } else { (1.0, 1.0) };
                 ln_path += model.ln_exit(on_path) + if before_path == on_path_now { ln_back } else { ln_on };
-                let rows = if second_of_sequence { 1 } else { earlier.len };
                 let mut earlier_slots = [WIDTH; WIDTH];
                 if hint.is_some() {
                     for (slot, &vertex) in earlier_slots.iter_mut().zip(there.vertices()) {
                         *slot = earlier.position(vertex);
                     }
                 }
+                // Without a turn hint behind, the ways to a vertex need not be told apart.
+                let together = record.forgets_way(index);
                 for (slot, &from) in here.vertices().iter().enumerate() {
                     let sum: f32 = cells.iter().take(rows).filter_map(|row| row.get(slot)).sum();
                     if sum <= 0.0 {
@@ -105,8 +107,10 @@ impl<const V: usize> Forward<V> {
                         let returning = cells.get(earlier_slot).and_then(|row| row.get(slot)).copied().unwrap_or(0.0);
                         let probability = exit * weight * (on * (sum - returning) + back * returning);
                         total += probability;
-                        if let Some(cell) = next.get_mut(slot).and_then(|row| row.get_mut(to_slot)) {
-                            *cell = probability;
+                        if let Some(cell) =
+                            next.get_mut(if together { 0 } else { slot }).and_then(|row| row.get_mut(to_slot))
+                        {
+                            *cell += probability;
                         }
                     }
                 }
@@ -115,7 +119,8 @@ impl<const V: usize> Forward<V> {
                 return 0.0;
             }
             let normaliser = 1.0 / total;
-            for row in next.iter_mut().take(here.len.max(1)) {
+            rows = if begins || record.forgets_way(index) { 1 } else { here.len };
+            for row in next.iter_mut().take(rows) {
                 row.iter_mut().for_each(|cell| *cell *= normaliser);
             }
             scale *= total;

@@ -109,6 +109,7 @@ impl<const V: usize, const T: usize> Hypothesis<V, T> {
 
     /// How the evidence changes when the newest observation, number `index` of the record, is at a vertex, and the key
     /// of the map then. A vertex behind the last is a new one.
+    #[inline(never)]
     pub(super) fn gain(
         &self,
         prices: &Prices,
@@ -165,6 +166,7 @@ impl<const V: usize, const T: usize> Hypothesis<V, T> {
 
     /// As [`Hypothesis::gain`], for a map that is kept as it is: how well the newest observation fits a vertex, and what the
     /// way there costs. Where there is no edge the robot may have been carried.
+    #[inline(never)]
     pub(super) fn arrival(
         &self,
         prices: &Prices,

@@ -92,6 +92,11 @@ impl<const T: usize> Record<T> {
         }
     }
 
+    /// Whether what follows an observation does not depend on the place before it: the next one comes without turn hint.
+    pub(super) fn forgets_way(&self, index: usize) -> bool {
+        self.get(index + 1).is_some_and(|next| next.turn().is_none() && !next.begins())
+    }
+
     /// All observations, the oldest first.
     pub(super) fn iter(&self) -> impl Iterator<Item = Entry> + '_ {
         let all = self.steps.iter().zip(&self.hints).take(self.len);

@@ -58,6 +58,7 @@ pub(super) fn worst_ngram<const V: usize, const T: usize>(record: &Record<T>, ma
 }
 
 /// The walk of the map that is nearest to an n-gram in the maximum norm (Eq. 3), and its distance in steps.
+#[inline(never)]
 fn nearest_walk<const V: usize>(map: &Map<V>, labels: &[u16; LENGTH]) -> (u16, [u8; LENGTH]) {
     let mut distances = [0_u16; V];
     let mut backs = [[0_u8; V]; LENGTH];
