@@ -18,16 +18,17 @@ const LOOKS: usize = 16;
 /// history add nothing to it, since the map has the U-turns of its walks too. `path` gives the vertex of each observation.
 /// Cost: O(T) and at most 16 times O(n · V · degree).
 pub(super) fn worst_ngram<const V: usize, const T: usize>(record: &Record<T>, map: &Map<V>, path: &[u8]) -> WorstNgram {
-    let mut residuals = [0_u16; T];
-    for ((entry, &vertex), residual) in record.iter().zip(path).zip(&mut residuals) {
-        *residual = map.label(vertex).map_or(0, |label| entry.steps.abs_diff(label.steps()));
+    // How far the path is from each n-gram, by the place of its newest label: first of that label alone.
+    let mut bounds = [0_u16; T];
+    for ((entry, &vertex), bound) in record.iter().zip(path).zip(&mut bounds) {
+        *bound = map.label(vertex).map_or(0, |label| entry.steps.abs_diff(label.steps()));
     }
-    let residual = |index: usize| residuals.get(index).copied().unwrap_or(0);
-    let is_whole = |end: usize| {
-        end + 1 >= LENGTH
-            && (end + 2 - LENGTH..=end).all(|index| record.get(index).is_some_and(|entry| !entry.begins()))
-    };
-    let bound = |end: usize| (end + 1 - LENGTH..=end).map(residual).max().unwrap_or(0);
+    for end in (LENGTH - 1..record.len()).rev() {
+        let largest = bounds.get(end + 1 - LENGTH..=end).and_then(|bounds| bounds.iter().max()).copied();
+        if let (Some(bound), Some(largest)) = (bounds.get_mut(end), largest) {
+            *bound = largest;
+        }
+    }
     let mut worst = WorstNgram::NONE;
     let mut found: Option<u16> = None;
     let mut ceiling = u16::MAX;
@@ -35,10 +36,11 @@ pub(super) fn worst_ngram<const V: usize, const T: usize>(record: &Record<T>, ma
     for _ in 0..LOOKS {
         // The next n-gram by bound; of equal ones the older first.
         let mut next: Option<(u16, usize)> = None;
-        for end in (0..record.len()).filter(|&end| is_whole(end)) {
-            let bound = bound(end);
+        let mut labels = 0;
+        for (end, (entry, &bound)) in record.iter().zip(&bounds).enumerate() {
+            labels = if entry.begins() { 1 } else { labels + 1 };
             let is_next = bound < ceiling || bound == ceiling && end > after;
-            if is_next && next.is_none_or(|(largest, _)| bound > largest) {
+            if labels >= LENGTH && is_next && next.is_none_or(|(largest, _)| bound > largest) {
                 next = Some((bound, end));
             }
         }
