@@ -292,8 +292,15 @@ fn robust<const N: usize, const V: usize, const HISTORY: usize>(filter: &mut Rob
         let observation =
             Observation { fingerprint: any_fingerprint(), turn: any_turn(), degree: black_box(Some(3)), begins: false };
         black_box(filter.observe(observation.opaque()));
+        filter.polish();
         filter.set_localise_only(black_box(true));
+        filter.polish();
+        black_box(filter.refresh());
+        black_box(filter.assume_path(black_box(&[0, 1, 0])));
     }
+    let map = *filter.map();
+    let restarted = filter.start_with_map(RobustConfig::default().opaque(), black_box(1), black_box(&map));
+    black_box((restarted, filter.evidence(), filter.noise_mm()));
     black_box((filter.map(), filter.observed(), filter.faults(), filter.renamed(black_box(3)), filter.worst()));
     black_box((filter.place_probability_q16(black_box(3)), filter.map_probability_q16()));
     for vertex in filter.path() {
