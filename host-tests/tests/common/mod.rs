@@ -5,6 +5,8 @@
 
 pub mod drive;
 pub mod random;
+pub mod robot;
+pub mod watched;
 
 use toposlam::{Consistency, Direction, Evidence, Fingerprint, History, Map, NgramLength, NgramTable};
 use toposlam_host_tests::consistency::Hausdorff;
