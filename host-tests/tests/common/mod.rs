@@ -4,6 +4,7 @@
 #![allow(dead_code, unreachable_pub, reason = "each test binary compiles this and uses its own part")]
 
 pub mod drive;
+pub mod environments;
 pub mod random;
 pub mod robot;
 pub mod watched;
