@@ -24,9 +24,12 @@
 //!
 //! Labels and distances are in millimetres. Weights are natural logarithms, so that nothing underflows. Eq. 5 is Bayes'
 //! theorem and has no function of its own.
+//!
+//! [`robust`] is not of the paper: it is the evidence by which this project's own filter weighs hypotheses.
 #![forbid(unsafe_code)]
 
 pub mod consistency;
 pub mod filter;
 pub mod graph;
 pub mod ngram;
+pub mod robust;

@@ -4,7 +4,10 @@
 #![allow(dead_code, unreachable_pub, reason = "each test binary compiles this and uses its own part")]
 
 pub mod drive;
+pub mod environments;
 pub mod random;
+pub mod robot;
+pub mod watched;
 
 use toposlam::{Consistency, Direction, Evidence, Fingerprint, History, Map, NgramLength, NgramTable};
 use toposlam_host_tests::consistency::Hausdorff;

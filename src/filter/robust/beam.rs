@@ -238,3 +238,68 @@ fn copy<H: Clone>(slots: &mut [H], from: usize, to: usize) {
         if from < to { high.clone_from(low) } else { low.clone_from(high) }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{Fingerprint, Observation, RobustConfig};
+    use std::collections::BTreeSet;
+
+    const WANTED: usize = 6;
+
+    fn check(beam: &Beam<6, 5, 32>) {
+        let keys: BTreeSet<u32> = beam.iter().map(Hypothesis::key).collect();
+        assert_eq!(keys.len(), beam.len(), "no two have the same map and place");
+        assert!(beam.iter().is_sorted_by(|better, worse| better.score() >= worse.score()));
+        let slots: BTreeSet<u8> = beam.order.iter().copied().collect();
+        assert_eq!(slots.len(), 6, "every slot is ranked once: {:?}", beam.order);
+    }
+
+    #[test]
+    fn hypotheses_are_distinct_ranked_and_as_good_as_counted_anew() {
+        let mut prices = Prices::new();
+        prices.configure(&RobustConfig::DEFAULT);
+        let mut record = Record::<32>::new();
+        let mut beam = Box::new(Beam::<6, 5, 32>::new());
+        beam.clear();
+        for index in 0..32 {
+            let steps = 500 + 60 * (index as u16 * 7 % 4) + index as u16 % 5;
+            let observation = Observation::new(Fingerprint::from_steps(steps).unwrap());
+            record.push(&Observation { begins: index % 12 == 0, degree: Some(2), ..observation });
+            let entry = record.get(index).unwrap();
+            beam.grow(&prices, &record, (index, entry), WANTED, false);
+            check(&beam);
+            for rank in 0..beam.len() {
+                // As a move does: another vertex for one place, which may give a map that is there already.
+                let mut other = *beam.get(rank).unwrap();
+                let (evidence, key) = (other.evidence, other.key());
+                other.rebuild(&prices, &record);
+                assert!((other.evidence - evidence).abs() < 1e-2, "{} {evidence}", other.evidence);
+                assert_eq!(other.key(), key);
+                other.path[index / 2] = other.path[index / 3];
+                other.rebuild(&prices, &record);
+                if (0..5).all(|vertex| !other.is_edge(vertex, vertex)) {
+                    beam.insert(&other, WANTED);
+                }
+                check(&beam);
+            }
+        }
+        assert_eq!(beam.len(), WANTED);
+    }
+
+    #[test]
+    fn an_equal_map_is_taken_in_only_when_it_is_better_and_in_place_of_the_other() {
+        let mut beam = Box::new(Beam::<6, 5, 32>::new());
+        beam.clear();
+        let mut same = *beam.get(0).unwrap();
+        assert!(!beam.insert(&same, WANTED));
+        same.evidence = 1.0;
+        assert!(beam.insert(&same, WANTED));
+        assert_eq!((beam.len(), beam.get(0).map(Hypothesis::score)), (1, Some(1.0)));
+        same.evidence = 0.5;
+        assert!(!beam.insert(&same, WANTED));
+        same.place = 1;
+        assert!(beam.insert(&same, WANTED));
+        assert_eq!(beam.len(), 2);
+    }
+}

@@ -118,3 +118,40 @@ pub(super) fn packed(observation: &Observation) -> Entry {
         hints: turn | degree << DEGREE_SHIFT | begins,
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn observations_come_back_as_they_went_in() {
+        let mut record = Record::<8>::new();
+        let turns = [None, Some(Turn::Back), Some(Turn::On)];
+        for (steps, turn) in [0, 1, Fingerprint::MAX.steps()].into_iter().zip(turns) {
+            for (degree, kept) in [(None, 0), (Some(0), 0), (Some(1), 1), (Some(7), 7), (Some(8), 7), (Some(255), 7)] {
+                for begins in [false, true] {
+                    let fingerprint = Fingerprint::from_steps(steps).unwrap();
+                    record.clear();
+                    record.push(&Observation { fingerprint, turn, degree, begins });
+                    let entry = record.get(0).unwrap();
+                    assert_eq!((entry.steps, entry.turn()), (steps, turn));
+                    assert_eq!((entry.degree(), entry.begins()), (kept, begins));
+                    assert_eq!(record.get(1), None);
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn a_full_record_takes_nothing_until_the_oldest_is_dropped() {
+        let mut record = Record::<8>::new();
+        let at = |steps| Observation::new(Fingerprint::from_steps(steps).unwrap());
+        (0..9).for_each(|steps| record.push(&at(steps)));
+        assert!(record.is_full() && record.iter().map(|entry| entry.steps).eq(0..8));
+        record.drop_oldest();
+        record.push(&at(9));
+        record.begin_with_newest();
+        assert!(record.iter().map(|entry| entry.steps).eq([1, 2, 3, 4, 5, 6, 7, 9]));
+        assert!(record.iter().map(Entry::begins).eq((0..8).map(|index| index == 7)));
+    }
+}

@@ -90,3 +90,48 @@ impl Tally {
         self.scatter
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::record::packed;
+    use super::*;
+    use crate::Observation;
+
+    fn tally(visits: impl IntoIterator<Item = (u16, u8)>) -> Tally {
+        let mut tally = Tally::NONE;
+        for (steps, degree) in visits {
+            let fingerprint = Fingerprint::from_steps(steps).unwrap();
+            tally.include(packed(&Observation { degree: Some(degree), ..Observation::new(fingerprint) }));
+        }
+        tally
+    }
+
+    #[test]
+    fn adding_is_including_one_by_one() {
+        let visits: Vec<(u16, u8)> = (0..40).map(|visit| (500 + visit * 37 % 61, (visit % 9) as u8)).collect();
+        let whole = tally(visits.iter().copied());
+        for split in 0..=visits.len() {
+            let (first, second) = visits.split_at(split);
+            let mut sum = tally(first.iter().copied());
+            sum.add(&tally(second.iter().copied()));
+            assert_eq!((sum.visits, sum.degrees), (whole.visits, whole.degrees));
+            assert!((sum.mean() - whole.mean()).abs() < 1e-3, "{} {}", sum.mean(), whole.mean());
+            assert!((sum.scatter() - whole.scatter()).abs() < 1e-4 * whole.scatter());
+        }
+    }
+
+    #[test]
+    fn degrees_above_seven_count_as_seven_and_0_as_unknown() {
+        assert_eq!(tally([(1, 7), (1, 8), (1, 255), (1, 0)]).degrees, [0, 0, 0, 0, 0, 0, 3]);
+        assert!(!tally([(1, 0)]).knows_degrees());
+    }
+
+    #[test]
+    fn a_known_vertex_keeps_its_label_and_its_visits_are_limited() {
+        let label = Fingerprint::from_steps(600).unwrap();
+        let known = Tally::known(label, 9, 10.0);
+        assert_eq!((known.mean_label(), known.visits, known.scatter()), (label, 9, 800.0));
+        assert_eq!(Tally::known(label, u16::MAX, 10.0).visits, FADE_VISITS);
+        assert_eq!(Tally::known(label, 0, 10.0).visits, 1);
+    }
+}

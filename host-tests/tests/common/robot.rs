@@ -1,0 +1,137 @@
+//! A robot on a random walk through an environment, and how right the map is that a robust filter makes of it.
+
+use super::drive::Random;
+use std::collections::BTreeSet;
+use toposlam::{Fingerprint, Observation, RobustFilter, Turn};
+use toposlam_host::evaluation::{
+    environment::Environment, equivalence::SmallestEquivalent, graph::Graph, score::score_map,
+};
+
+/// What the robot tells besides fingerprints, and how often that is missing or wrong.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Hints {
+    /// Whether it tells how it turned.
+    pub turn: bool,
+    /// Whether it tells how many ways there are; in one of ten cases one more or less.
+    pub degree: bool,
+    /// How often a hint is missing, in percent.
+    pub missing_percent: usize,
+    /// How often a turn is told wrong, in percent.
+    pub wrong_percent: usize,
+}
+
+/// Turn hints that are always there and always right.
+pub const TURNS: Hints = Hints { turn: true, degree: false, missing_percent: 0, wrong_percent: 0 };
+
+/// A robot in an environment.
+pub struct Robot<'a> {
+    environment: &'a Environment,
+    hints: Hints,
+    random: Random,
+    /// The places it visited, in order.
+    pub walk: Vec<usize>,
+    /// Where its drive since it was last put down began in `walk`.
+    put_down: usize,
+    next: Option<(usize, bool)>,
+}
+
+impl<'a> Robot<'a> {
+    /// A robot that is put down at a random place.
+    pub fn new(environment: &'a Environment, hints: Hints, seed: u64) -> Self {
+        Self { environment, hints, random: Random(seed), walk: Vec::new(), put_down: 0, next: None }
+    }
+
+    /// Carries the robot to a place, which it visits next; it may tell of it or not.
+    pub fn carry_to(&mut self, place: usize, is_told: bool) {
+        self.next = Some((place, is_told));
+    }
+
+    /// Carries the robot to a random place that is no neighbour of where it is, and is not where it is.
+    pub fn carry_off(&mut self, is_told: bool) {
+        let here = *self.walk.last().expect("it has been somewhere");
+        let near = &self.environment.neighbours()[here];
+        let places = self.environment.places().len();
+        let far: Vec<usize> = (0..places).filter(|place| *place != here && !near.contains(place)).collect();
+        let place = far[self.random.below(far.len())];
+        self.carry_to(place, is_told);
+    }
+
+    /// Drives to a random neighbour, back to where it came from included, and looks.
+    pub fn step(&mut self) -> Observation {
+        let carried = self.next.take();
+        let place = match (carried, self.walk.last()) {
+            (Some((place, _)), _) => place,
+            (None, None) => self.random.below(self.environment.places().len()),
+            (None, Some(&here)) => {
+                let ways = &self.environment.neighbours()[here];
+                ways[self.random.below(ways.len())]
+            }
+        };
+        if carried.is_some() {
+            self.put_down = self.walk.len();
+        }
+        self.walk.push(place);
+        let turned_back = self.walk.iter().skip(self.put_down).rev().nth(2).map(|&before| before == place);
+        let [missing_turn, wrong_turn, missing_degree] = [(); 3].map(|()| self.random.below(100));
+        let turn = turned_back.filter(|_| self.hints.turn && missing_turn >= self.hints.missing_percent);
+        let turn = turn.map(|back| if back != (wrong_turn < self.hints.wrong_percent) { Turn::Back } else { Turn::On });
+        let ways = self.environment.neighbours()[place].len() as u8;
+        let told = match self.random.below(20) {
+            0 => ways.saturating_sub(1).max(1),
+            1 => ways + 1,
+            _ => ways,
+        };
+        let degree = (self.hints.degree && missing_degree >= self.hints.missing_percent).then_some(told);
+        let begins = carried.is_some_and(|(_, is_told)| is_told);
+        Observation { fingerprint: self.look(place), turn, degree, begins }
+    }
+
+    /// A Gaussian fingerprint of a place: the sum of twelve uniform numbers.
+    pub fn look(&mut self, place: usize) -> Fingerprint {
+        let place = self.environment.places()[place];
+        let uniform = |_| self.random.below(1 << 20) as f64 / f64::from(1 << 20) - 0.5;
+        let radius_mm = place.mean_mm + place.sd_mm * (0..12).map(uniform).sum::<f64>();
+        let steps = (radius_mm / f64::from(Fingerprint::STEP_MM)).round();
+        Fingerprint::from_steps(steps as u16).unwrap_or(Fingerprint::MAX)
+    }
+
+    /// Whether the map of a filter is the part of the environment that was traversed, vertex by vertex and edge by edge,
+    /// places merged that no walk tells apart.
+    pub fn is_mapped_by<const N: usize, const V: usize, const HISTORY: usize>(
+        &self,
+        filter: &RobustFilter<N, V, HISTORY>,
+    ) -> bool {
+        let truth = SmallestEquivalent::of_traversed(self.environment, &self.walk);
+        self.is_exact(filter, &truth)
+    }
+
+    /// Whether the map of a filter is the whole environment.
+    pub fn is_all_mapped_by<const N: usize, const V: usize, const HISTORY: usize>(
+        &self,
+        filter: &RobustFilter<N, V, HISTORY>,
+    ) -> bool {
+        self.is_exact(filter, &SmallestEquivalent::of_environment(self.environment))
+    }
+
+    fn is_exact<const N: usize, const V: usize, const HISTORY: usize>(
+        &self,
+        filter: &RobustFilter<N, V, HISTORY>,
+        truth: &SmallestEquivalent,
+    ) -> bool {
+        let map = filter.map();
+        let edges = map.edges().map(|(a, b)| (usize::from(a), usize::from(b)));
+        let graph = Graph::from_edges(map.vertices().into(), edges);
+        let path: Vec<usize> = filter.path().map(usize::from).collect();
+        let newest = &self.walk[self.walk.len() - path.len()..];
+        let classes: Vec<usize> = newest.iter().filter_map(|&place| truth.class_of_place[place]).collect();
+        score_map(&graph, &path, &truth.graph, &classes).exact
+    }
+
+    /// The place that a vertex of a path was mostly visited at.
+    pub fn place_of(&self, path: &[u8], vertex: u8) -> Option<usize> {
+        let newest = &self.walk[self.walk.len() - path.len()..];
+        let visits = || path.iter().zip(newest).filter(|&(&visited, _)| visited == vertex).map(|(_, &place)| place);
+        let places: BTreeSet<usize> = visits().collect();
+        places.into_iter().max_by_key(|&place| visits().filter(|&visited| visited == place).count())
+    }
+}
