@@ -53,7 +53,7 @@ impl<const V: usize> Forward<V> {
             let best_fit = there.fits.first().copied().unwrap_or(0.0);
             let mut weights = [0.0_f32; WIDTH];
             for (weight, (vertex, fit)) in weights.iter_mut().zip(there.iter()) {
-                *weight = libm::expf(fit - best_fit);
+                *weight = if fit == best_fit { 1.0 } else { libm::expf(fit - best_fit) };
                 if vertex == on_path_now {
                     ln_path += fit - best_fit;
                 }

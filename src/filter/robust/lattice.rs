@@ -151,7 +151,10 @@ impl<const V: usize> Model<V> {
                 *way = ways;
             }
         }
-        self.find_firm(record, hypothesis);
+        // The evidence counts every edge alike.
+        if weighing == Weighing::Predictive {
+            self.find_firm(record, hypothesis);
+        }
     }
 
     fn find_firm<const T: usize>(&mut self, record: &Record<T>, hypothesis: &Hypothesis<V, T>) {
