@@ -74,8 +74,8 @@ fn agree(drives: u64, most_places: usize, longest: usize, told: Told) {
     println!("{tally:?}");
     assert!(tally.compared > 300 && tally.searched > 300, "{tally:?}");
     assert!(tally.pruned * 20 <= tally.compared, "what the core leaves out seldom matters: {tally:?}");
-    assert!(tally.stale * 50 <= tally.compared, "surplus and place are those of the best hypothesis: {tally:?}");
-    assert!(tally.overlooked * 100 <= tally.searched, "the worst n-gram is found: {tally:?}");
+    assert!(tally.stale == 0, "surplus and place are those of the best hypothesis: {tally:?}");
+    assert!(tally.overlooked == 0, "the worst n-gram is found: {tally:?}");
 }
 
 #[test]
@@ -95,5 +95,5 @@ fn degrees_are_weighed_as_the_reference_does() {
 
 #[test]
 fn sequences_with_all_hints_are_weighed_as_the_reference_does() {
-    agree(100, 5, 50, Told { turns: true, degrees: true, carried_percent: 12 });
+    agree(130, 5, 60, Told { turns: true, degrees: true, carried_percent: 12 });
 }

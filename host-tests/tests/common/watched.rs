@@ -200,13 +200,13 @@ impl<const N: usize, const V: usize, const HISTORY: usize> Watched<N, V, HISTORY
     }
 
     /// The worst n-gram has the directed distance of Eq. 2, by the reference over the sequences and, where there is one
-    /// sequence, by the core's own measure of histories. It is compared at every place at first, then at every fourth.
+    /// sequence, by the core's own measure of histories. It is compared at every place at first, and from the fiftieth on.
     fn check_worst(&mut self, update: &Update) {
         const N_GRAM: usize = 5;
         let map = self.filter.map();
         let worst = self.filter.worst();
         assert_eq!(update.consistency_mm, worst.distance_mm);
-        if self.observations.len() > 20 && !self.observations.len().is_multiple_of(4) {
+        if self.observations.len() > 20 && self.observations.len() < 50 {
             return;
         }
         let step_mm = f64::from(Fingerprint::STEP_MM);

@@ -4,6 +4,9 @@ use super::hypothesis::Hypothesis;
 use super::prices::Prices;
 use super::record::{Entry, Record};
 
+/// A hypothesis this far below the best one has no place even where there is room, in nats.
+const UNLIKELY: f32 = 1000.0;
+
 /// A hypothesis to be: a parent, and the vertex that its newest place is taken for.
 #[derive(Clone, Copy, Debug)]
 struct Candidate {
@@ -84,7 +87,8 @@ impl<const N: usize, const V: usize, const T: usize> Beam<N, V, T> {
     /// The score that a new hypothesis has to exceed.
     pub(super) fn threshold(&self, wanted: usize) -> f32 {
         let worst = self.get(self.len.saturating_sub(1)).filter(|_| self.len >= wanted.min(N));
-        worst.map_or(f32::NEG_INFINITY, Hypothesis::score)
+        let best = self.get(0).map_or(f32::NEG_INFINITY, Hypothesis::score);
+        worst.map_or(best - UNLIKELY, Hypothesis::score)
     }
 
     /// Restores the order by score.

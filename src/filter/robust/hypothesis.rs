@@ -34,6 +34,8 @@ pub(super) struct Hypothesis<const V: usize, const T: usize> {
     pub(super) evidence: f32,
     /// By how much the evidence of the map, all its paths together, exceeds that of this one path, as last computed.
     pub(super) surplus: f32,
+    /// Evidence of counts that have faded.
+    faded: f32,
     /// Identifies the map; vertices are numbered in the order of their first visit.
     map_key: u32,
     pub(super) path: [u8; T],
@@ -54,6 +56,7 @@ impl<const V: usize, const T: usize> Hypothesis<V, T> {
         hints: 0.0,
         evidence: 0.0,
         surplus: 0.0,
+        faded: 0.0,
         map_key: 0,
         path: [0; T],
         tallies: [Tally::NONE; V],
@@ -70,6 +73,7 @@ impl<const V: usize, const T: usize> Hypothesis<V, T> {
         self.hints = 0.0;
         self.evidence = 0.0;
         self.surplus = 0.0;
+        self.faded = 0.0;
         self.map_key = 0;
         self.tallies.fill(Tally::NONE);
         self.settled.fill(Tally::NONE);
@@ -266,9 +270,11 @@ impl<const V: usize, const T: usize> Hypothesis<V, T> {
         if entry.begins() || begins_before { 0.0 } else { prices.turn(entry.turn(), self.goes_back(index, vertex)) }
     }
 
-    /// Takes leave of the oldest observation: its counts stay. The evidence stays as it is.
-    pub(super) fn settle_oldest(&mut self, record: &Record<T>) {
-        let (Some(oldest), Some(next)) = (record.get(0), record.get(1)) else { return };
+    /// Takes leave of the oldest observation: its counts stay. Tells whether counts have faded, so that the hypothesis has to
+    /// be [rebased](Hypothesis::rebase) when the record has dropped the observation.
+    pub(super) fn settle_oldest(&mut self, record: &Record<T>) -> bool {
+        let (Some(oldest), Some(next)) = (record.get(0), record.get(1)) else { return false };
+        let mut has_faded = false;
         let vertex = self.at(0);
         if !oldest.begins() && self.before != NOWHERE {
             join(&mut self.settled_neighbours, self.before, vertex);
@@ -278,10 +284,29 @@ impl<const V: usize, const T: usize> Hypothesis<V, T> {
             if !next.begins() {
                 settled.exits = settled.exits.saturating_add(1);
             }
-            settled.fade();
+            has_faded = settled.fade();
         }
         self.before = if next.begins() { NOWHERE } else { vertex };
         self.path.copy_within(1.., 0);
+        has_faded
+    }
+
+    /// Counts anew what the settled counts say now, with the evidence as it was.
+    pub(super) fn rebase(&mut self, prices: &Prices, record: &Record<T>) {
+        let before = self.evidence;
+        self.recount(prices, record);
+        self.faded += before - self.evidence;
+        self.evidence = before;
+    }
+
+    /// Takes a common amount of faded evidence from a hypothesis, so that sums stay small in long runs.
+    pub(super) fn forget(&mut self, faded: f32) {
+        self.faded -= faded;
+        self.evidence -= faded;
+    }
+
+    pub(super) fn faded(&self) -> f32 {
+        self.faded
     }
 
     /// Counts everything anew from a path that was changed: numbers the vertices by first visit, drops those without
@@ -329,10 +354,10 @@ impl<const V: usize, const T: usize> Hypothesis<V, T> {
 
     /// The evidence from the counts.
     pub(super) fn total(&self, prices: &Prices) -> f32 {
-        self.factors(prices).iter().sum()
+        self.faded + self.factors(prices).iter().sum::<f32>()
     }
 
-    /// The factors of the evidence: of the labels, of the moves between places, and of the size of the map.
+    /// The factors of the evidence, but for what has faded: of the labels, of the moves between places, and of the size of the map.
     pub(super) fn factors(&self, prices: &Prices) -> [f32; 3] {
         let mut labels = 0.0;
         let mut moves = self.hints - f32::from(self.starts) * ln(self.vertices.max(1));

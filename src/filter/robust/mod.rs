@@ -44,6 +44,9 @@ use record::Record;
 const NOISE_FROM: u32 = 10;
 const NOISE_OFTEN_UNTIL: u32 = 40;
 
+/// How many hypotheses are brought up to date at a place at most, until the best one is.
+const SOFTENED: u8 = 3;
+
 /// One in the unit of probabilities.
 const ONE_Q16: f32 = 65536.0;
 
@@ -157,6 +160,7 @@ impl<const N: usize, const V: usize, const HISTORY: usize> RobustFilter<N, V, HI
         self.draft.know(map, f32::from(config.noise_mm) / f32::from(Fingerprint::STEP_MM));
         self.draft.recount(&self.prices, &self.record);
         self.beam.begin_with(&self.draft);
+        self.names.begin_with(map.vertices());
         self.map = *map;
         Ok(())
     }
@@ -164,10 +168,18 @@ impl<const N: usize, const V: usize, const HISTORY: usize> RobustFilter<N, V, HI
     /// Whether the map is kept as it is from now on: the filter then only tells where the robot is, notices by itself when
     /// it was carried elsewhere, and makes no moves. The places seen meanwhile count as evidence when mapping goes on.
     pub fn set_localise_only(&mut self, localise_only: bool) {
-        if localise_only && !self.localise_only {
-            self.beam.keep_best();
+        if localise_only == self.localise_only {
+            return;
+        }
+        if localise_only && self.observed > 0 {
+            // The map that is kept is the one that is told.
+            self.refresh();
         }
         self.localise_only = localise_only;
+        self.beam.keep_best();
+        if !localise_only && let Some(best) = self.beam.get_mut(0) {
+            best.recount(&self.prices, &self.record);
+        }
     }
 
     /// Takes the next place, makes the configured number of moves, and publishes the best map.
@@ -179,9 +191,13 @@ impl<const N: usize, const V: usize, const HISTORY: usize> RobustFilter<N, V, HI
         if self.record.is_full() {
             self.faults.count(FaultKind::HistoryFull);
             let record = &self.record;
-            self.beam.each(|hypothesis| hypothesis.settle_oldest(record));
+            let mut have_faded = false;
+            self.beam.each(|hypothesis| have_faded |= hypothesis.settle_oldest(record));
             self.names.drop_oldest();
             self.record.drop_oldest();
+            if have_faded {
+                self.rebase();
+            }
         }
         let index = self.record.len();
         self.record.push(&observation);
@@ -193,7 +209,7 @@ impl<const N: usize, const V: usize, const HISTORY: usize> RobustFilter<N, V, HI
         }
         self.polished = 0;
         if self.localise_only {
-            self.notice_carriage(index);
+            self.notice_carriage();
         } else {
             for _ in 0..self.config.moves {
                 self.polish();
@@ -246,26 +262,35 @@ impl<const N: usize, const V: usize, const HISTORY: usize> RobustFilter<N, V, HI
         }
     }
 
-    /// Where no edge leads to the newest place, the robot was carried there.
-    fn notice_carriage(&mut self, index: usize) {
+    /// Goes on with counts that have faded.
+    fn rebase(&mut self) {
+        let (prices, record) = (&self.prices, &self.record);
+        self.beam.each(|hypothesis| hypothesis.rebase(prices, record));
+        let common = self.beam.get(0).map_or(0.0, Hypothesis::faded);
+        self.beam.each(|hypothesis| hypothesis.forget(common));
+    }
+
+    /// Where no edge of the map leads from one place of the best path to the next, the robot was carried.
+    fn notice_carriage(&mut self) {
         let Some(best) = self.beam.get(0) else { return };
-        if index > 0 && !best.is_edge(best.at(index - 1), best.place) {
-            self.record.begin_with_newest();
+        for index in 1..self.record.len() {
+            self.record.set_carried(index, !best.is_edge(best.at(index - 1), best.at(index)));
         }
     }
 
     /// Computes anew how much the best map gains from its other paths, until the best one is up to date, and the distribution
-    /// of the place.
+    /// of its newest place.
     fn soften_best(&mut self) {
-        for _ in 0..2 {
+        for round in 1..=SOFTENED {
             let Some(best) = self.beam.get_mut(0) else { return };
             self.model.read(&self.prices, &self.record, best, Weighing::Expected);
             let surplus = self.forward.surplus(&self.prices, &self.record, &self.model, best);
-            let held = core::mem::replace(&mut best.surplus, prices::SURPLUS_SHARE * surplus);
-            if best.surplus >= held || self.localise_only {
+            best.surplus = prices::SURPLUS_SHARE * surplus;
+            let key = best.key();
+            // The last one is told even if another has become the better one by now: its belief is at hand.
+            if self.localise_only || round == SOFTENED {
                 return;
             }
-            let key = best.key();
             self.beam.sort();
             if self.beam.get(0).is_some_and(|now| now.key() == key) {
                 return;
@@ -287,7 +312,11 @@ impl<const N: usize, const V: usize, const HISTORY: usize> RobustFilter<N, V, HI
     /// Tells the best map under the numbers that its vertices are known by.
     fn publish(&mut self) -> Update {
         let Some(best) = self.beam.get(0) else { return Update::NONE };
-        self.names.follow(&self.record, &self.map, best);
+        if self.localise_only {
+            self.names.hold(&self.record, best);
+        } else {
+            self.names.follow(&self.record, &self.map, best);
+        }
         self.map.clear();
         for name in 0..best.vertices {
             let vertex = (0..best.vertices).find(|&vertex| self.names.name(vertex) == name).unwrap_or(0);

@@ -26,6 +26,29 @@ impl<const V: usize, const T: usize> Names<V, T> {
         self.vertices = 0;
     }
 
+    /// Begins with a known map, whose vertices are numbered as they are.
+    pub(super) fn begin_with(&mut self, vertices: u8) {
+        self.vertices = vertices;
+        for (number, (name, renamed)) in (0..).zip(self.names.iter_mut().zip(&mut self.renamed)) {
+            (*name, *renamed) = (number, number);
+        }
+    }
+
+    /// Keeps all numbers, for a map that is kept as it is.
+    pub(super) fn hold(&mut self, record: &Record<T>, best: &Hypothesis<V, T>) {
+        self.vertices = best.vertices;
+        for (number, renamed) in (0..).zip(&mut self.renamed) {
+            *renamed = number;
+        }
+        self.trace(record, best);
+    }
+
+    fn trace(&mut self, record: &Record<T>, best: &Hypothesis<V, T>) {
+        for (name, &vertex) in self.path.iter_mut().zip(&best.path).take(record.len()) {
+            *name = self.names.get(usize::from(vertex)).copied().unwrap_or(0);
+        }
+    }
+
     /// Takes leave of the oldest observation.
     pub(super) fn drop_oldest(&mut self) {
         self.path.copy_within(1.., 0);
@@ -86,9 +109,7 @@ impl<const V: usize, const T: usize> Names<V, T> {
             };
         }
         self.settle_unvisited(map, best);
-        for (name, &vertex) in self.path.iter_mut().zip(&best.path).take(record.len()) {
-            *name = self.names.get(usize::from(vertex)).copied().unwrap_or(0);
-        }
+        self.trace(record, best);
     }
 
     /// The pair of a vertex without a number and a number not yet taken that share most visits; numbers without visits

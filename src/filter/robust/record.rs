@@ -9,12 +9,14 @@ const TURN_BACK: u8 = 1;
 const TURN_ON: u8 = 2;
 const DEGREE_SHIFT: u8 = 2;
 const BEGINS: u8 = 1 << 5;
+const CARRIED: u8 = 1 << 6;
 
 /// The newest `T` observations, the oldest first: 3 bytes each.
 #[derive(Clone, Debug)]
 pub(super) struct Record<const T: usize> {
     steps: [u16; T],
-    /// Turn in bits 0 and 1, degree in bits 2 to 4, bit 5 for the first place of a sequence.
+    /// Turn in bits 0 and 1, degree in bits 2 to 4, bit 5 for the first place of a sequence, bit 6 where
+    /// the robot seems to have been carried.
     hints: [u8; T],
     len: usize,
 }
@@ -28,7 +30,7 @@ pub(super) struct Entry {
 
 impl Entry {
     pub(super) const fn begins(self) -> bool {
-        self.hints & BEGINS != 0
+        self.hints & (BEGINS | CARRIED) != 0
     }
 
     pub(super) const fn turn(self) -> Option<Turn> {
@@ -78,10 +80,10 @@ impl<const T: usize> Record<T> {
         }
     }
 
-    /// Notes that the robot was carried to the newest place.
-    pub(super) fn begin_with_newest(&mut self) {
-        if let Some(hints) = self.len.checked_sub(1).and_then(|newest| self.hints.get_mut(newest)) {
-            *hints |= BEGINS;
+    /// Notes whether the robot seems to have been carried to a place.
+    pub(super) fn set_carried(&mut self, index: usize, carried: bool) {
+        if let Some(hints) = self.hints.get_mut(index) {
+            *hints = if carried { *hints | CARRIED } else { *hints & !CARRIED };
         }
     }
 

@@ -62,14 +62,16 @@ impl Tally {
         }
     }
 
-    /// Halves what was counted when it is more than a vertex needs.
-    pub(super) fn fade(&mut self) {
-        if self.visits >= FADE_VISITS {
+    /// Halves what was counted when it is more than a vertex needs; tells whether it was.
+    pub(super) fn fade(&mut self) -> bool {
+        let is_more = self.visits >= FADE_VISITS;
+        if is_more {
             self.scatter *= 0.5;
             self.visits /= 2;
             self.exits /= 2;
             self.degrees.iter_mut().for_each(|count| *count /= 2);
         }
+        is_more
     }
 
     pub(super) fn knows_degrees(&self) -> bool {

@@ -11,12 +11,12 @@ use crate::{Fingerprint, Map};
 /// n: how many labels an n-gram has, as in Section IV of the paper.
 pub(in crate::filter) const LENGTH: usize = 5;
 
-/// How many n-grams are looked at one by one; of further ones the bound is taken.
-const LOOKS: usize = 16;
+/// How many n-grams are looked at one by one. When more would have to be, which is rare, the distance told is a lower bound.
+const LOOKS: usize = 32;
 
 /// Finds max over the n-grams of the record of min over the walks of the map of Eq. 3: one half of Eq. 2. U-turns in the
 /// history add nothing to it, since the map has the U-turns of its walks too. `path` gives the vertex of each observation.
-/// Cost: O(T) and at most 16 times O(n · V · degree).
+/// Cost: O(T) and at most 32 times O(n · V · degree).
 pub(super) fn worst_ngram<const V: usize, const T: usize>(record: &Record<T>, map: &Map<V>, path: &[u8]) -> WorstNgram {
     // How far the path is from each n-gram, by the place of its newest label: first of that label alone.
     let mut bounds = [0_u16; T];
