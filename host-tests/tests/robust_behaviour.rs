@@ -443,6 +443,7 @@ mod bad_input {
                 moves,
                 wrong_turn_permille,
                 wrong_degree_permille,
+                ..RobustConfig::DEFAULT
             },
         )
     }

@@ -325,6 +325,7 @@ impl FilterArguments {
             moves: self.moves.unwrap_or(default.moves),
             wrong_turn_permille: self.wrong_turn.unwrap_or(default.wrong_turn_permille),
             wrong_degree_permille: self.wrong_degree.unwrap_or(default.wrong_degree_permille),
+            ..default
         })
     }
 

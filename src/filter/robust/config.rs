@@ -10,6 +10,8 @@ pub struct RobustConfig {
     /// A first guess at the standard deviation of a fingerprint in millimetres, 1 to 1000. Default 30; the filter then
     /// estimates it from its best map.
     pub noise_mm: u16,
+    /// The step of the fingerprints in millimetres, 1 to 1000: noise well below it is not believed. Default 2.
+    pub resolution_mm: u16,
     /// How many repair moves are tried at each place, 0 to 255. Default 1; more are made by `RobustFilter::polish`, in
     /// the time between two places.
     pub moves: u8,
@@ -21,12 +23,24 @@ pub struct RobustConfig {
 
 impl RobustConfig {
     /// The defaults.
-    pub const DEFAULT: Self =
-        Self { hypotheses: 10, noise_mm: 30, moves: 1, wrong_turn_permille: 20, wrong_degree_permille: 100 };
+    pub const DEFAULT: Self = Self {
+        hypotheses: 10,
+        noise_mm: 30,
+        resolution_mm: 2,
+        moves: 1,
+        wrong_turn_permille: 20,
+        wrong_degree_permille: 100,
+    };
 
     /// What a filter holds before it is started: all zero.
-    pub(super) const UNSET: Self =
-        Self { hypotheses: 0, noise_mm: 0, moves: 0, wrong_turn_permille: 0, wrong_degree_permille: 0 };
+    pub(super) const UNSET: Self = Self {
+        hypotheses: 0,
+        noise_mm: 0,
+        resolution_mm: 0,
+        moves: 0,
+        wrong_turn_permille: 0,
+        wrong_degree_permille: 0,
+    };
 
     /// Checks every field for a filter with room for `capacity` hypotheses.
     ///
@@ -36,6 +50,7 @@ impl RobustConfig {
         match () {
             () if self.hypotheses == 0 || usize::from(self.hypotheses) > capacity => Err(ConfigError("hypotheses")),
             () if !(1..=1000).contains(&self.noise_mm) => Err(ConfigError("noise_mm")),
+            () if !(1..=1000).contains(&self.resolution_mm) => Err(ConfigError("resolution_mm")),
             () if !(1..=500).contains(&self.wrong_turn_permille) => Err(ConfigError("wrong_turn_permille")),
             () if !(1..=500).contains(&self.wrong_degree_permille) => Err(ConfigError("wrong_degree_permille")),
             () => Ok(()),

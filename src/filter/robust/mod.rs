@@ -300,7 +300,9 @@ impl<const N: usize, const V: usize, const HISTORY: usize> RobustFilter<N, V, HI
 
     /// Takes the scale of the noise from what was observed, and weighs all hypotheses anew.
     fn estimate_noise(&mut self) {
-        let Some(deviation) = self.beam.get(0).and_then(|best| noise::deviation_steps(&self.record, best)) else {
+        let resolution = f32::from(self.config.resolution_mm) / f32::from(Fingerprint::STEP_MM);
+        let Some(deviation) = self.beam.get(0).and_then(|best| noise::deviation_steps(&self.record, best, resolution))
+        else {
             return;
         };
         self.prices.set_noise(deviation);

@@ -16,6 +16,9 @@ const DEVIATIONS: f32 = 0.82;
 /// By how much the scatter of the map may exceed what the differences show.
 const TOLERANCE: f32 = 1.5;
 
+/// The smallest estimate in steps of coarse fingerprints: labels that all fall into one step show no scatter at all.
+const RESOLUTIONS: f32 = 0.7;
+
 /// The range of the estimate, in steps.
 const SMALLEST_STEPS: f32 = 2.0;
 const LARGEST_STEPS: f32 = 150.0;
@@ -28,6 +31,7 @@ const LARGEST_STEPS: f32 = 150.0;
 pub(super) fn deviation_steps<const V: usize, const T: usize>(
     record: &Record<T>,
     best: &Hypothesis<V, T>,
+    resolution_steps: f32,
 ) -> Option<f32> {
     let mut scatter = 0.0;
     let mut freedom = 0.0;
@@ -39,7 +43,8 @@ pub(super) fn deviation_steps<const V: usize, const T: usize>(
         return None;
     }
     let pooled = libm::sqrtf(scatter / freedom);
-    Some(pooled.min(TOLERANCE * returning_deviation(record)).clamp(SMALLEST_STEPS, LARGEST_STEPS))
+    let smallest = SMALLEST_STEPS.max(RESOLUTIONS * resolution_steps);
+    Some(pooled.min(TOLERANCE * returning_deviation(record)).min(LARGEST_STEPS).max(smallest))
 }
 
 fn returning_deviation<const T: usize>(record: &Record<T>) -> f32 {

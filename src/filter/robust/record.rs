@@ -152,7 +152,7 @@ mod tests {
         assert!(record.is_full() && record.iter().map(|entry| entry.steps).eq(0..8));
         record.drop_oldest();
         record.push(&at(9));
-        record.begin_with_newest();
+        record.set_carried(record.len() - 1, true);
         assert!(record.iter().map(|entry| entry.steps).eq([1, 2, 3, 4, 5, 6, 7, 9]));
         assert!(record.iter().map(Entry::begins).eq((0..8).map(|index| index == 7)));
     }

@@ -5,7 +5,7 @@ use crate::evaluation::{
     run::{EvaluationError, Filter, Settings},
     trial::Trial,
 };
-use toposlam::{FaultKind, Map, Observation, RobustConfig, RobustFilter};
+use toposlam::{FaultKind, Fingerprint, Map, Observation, RobustConfig, RobustFilter};
 
 /// How many vertices a map of the robust filter can have.
 const ROBUST_VERTICES: usize = 32;
@@ -36,6 +36,9 @@ impl<const N: usize, const HISTORY: usize> Robust<N, HISTORY> {
     fn start(settings: &Settings, trial: &Trial) -> Box<dyn Candidate> {
         let mut filter = Box::new(RobustFilter::new());
         let config = if let Filter::Robust(config) = settings.filter { config } else { RobustConfig::DEFAULT };
+        // Coarser fingerprints have wider steps.
+        let resolution_mm = Fingerprint::STEP_MM << Fingerprint::BITS.saturating_sub(settings.fingerprint_bits);
+        let config = RobustConfig { resolution_mm: resolution_mm.min(1000), ..config };
         let started = filter.start(config, trial.filter_seed);
         assert!(started.is_ok(), "the configuration was checked");
         Box::new(Self(filter))
