@@ -72,7 +72,7 @@ fn the_report_has_the_documented_keys_and_shares_between_0_and_1() {
         let report = report(&[cases.as_slice(), &course].concat(), "2");
         let settings = json!({
             "seed": 1, "prior": "none", "hints": "none", "fingerprint_bits": 12, "ngram_length": 5,
-            "polish": 10, "polish_prior": 4, "search_from_truth": 0,
+            "polish": 10, "polish_prior": 10, "search_from_truth": 0,
             "filters": { filter: parameters },
         });
         assert_eq!(report["settings"], settings);

@@ -81,7 +81,7 @@ struct CourseArguments {
     #[arg(long, value_name = "SLICES", default_value_t = 10)]
     polish: u32,
     /// How many slices the robust filter uses after each place of the n-grams of a prior.
-    #[arg(long, value_name = "SLICES", default_value_t = 4)]
+    #[arg(long, value_name = "SLICES", default_value_t = 10)]
     polish_prior: u32,
     /// At each check point, also search for so many slices from the true path, and report how often the search leaves it
     /// for a better map: what no search could do better with this score. 0: no search.
