@@ -16,7 +16,7 @@
 //! ```
 //! use toposlam::place::{PlaceConfig, PlaceDetector};
 //! use toposlam::ring::{Echo, RingFrame, RingGeometry};
-//! use toposlam::{Config, PaperFilter};
+//! use toposlam::{Observation, RobustConfig, RobustFilter};
 //!
 //! /// What a ring of 16 sonars hears in a corridor that ends ahead.
 //! fn frame(half_width_mm: u16, ahead_mm: u16) -> RingFrame<16> {
@@ -29,15 +29,16 @@
 //!
 //! let mut detector = PlaceDetector::<16>::new();
 //! detector.start(PlaceConfig::DEFAULT, RingGeometry::even())?;
-//! let mut filter = PaperFilter::<10, 16, 8>::new();
-//! filter.start(Config::DEFAULT, 1)?;
+//! let mut filter = RobustFilter::<10, 16, 400>::new();
+//! filter.start(RobustConfig::DEFAULT, 1)?;
 //!
 //! // To and fro between the ends of a corridor that is 1.6 m wide at one end and 2.4 m at the other.
 //! for half_width_mm in [800, 1200, 800, 1200, 800] {
 //!     for step in -50_i16..=50 {
 //!         let ahead_mm = half_width_mm + 30 * step.unsigned_abs();
 //!         if let Some(place) = detector.observe(&frame(half_width_mm, ahead_mm)) {
-//!             let update = filter.observe(place.fingerprint);
+//!             let degree = place.degree;
+//!             let update = filter.observe(Observation { degree, ..Observation::new(place.fingerprint) });
 //!             println!("{} mm: vertex {}", place.fingerprint.radius_mm(), update.vertex);
 //!         }
 //!     }
@@ -89,9 +90,10 @@
 //! | Parameter | Means | Range | Reference robot |
 //! |---|---|---|---|
 //! | `SONARS` | sensors of the ring | 3 to 128 | 16 |
-//! | `N` | particles | 1 to 255 | 10 |
-//! | `V` | vertices of a map | 1 to 64 | 16 |
-//! | `WORDS` of a [`History`] | 32 places each | powers of two | 8: 256 places |
+//! | `N` | hypotheses, or particles | 1 to 255 | 10 |
+//! | `HISTORY` of a [`RobustFilter`] | places that moves can still explain in another way | 8 to 16384 | 400 |
+//! | `V` | vertices of a map | 1 to 64; 2 to 32 for the robust filter | 16 |
+//! | `WORDS` of a [`History`] | 32 places each, for the paper's filter | powers of two | none |
 //! | `WORDS` of an [`NgramTable`] or [`Prior`] | 16 n-grams each | even numbers up to 1024 | none: it maps on line |
 //!
 //! Each type states its size as a function of these. [`mod@reference`] has the capacities of the reference robot. What does
@@ -99,12 +101,16 @@
 //!
 //! # Determinism
 //!
-//! The same input, configuration and seed give the same result, bit for bit, on every target: weights are sums of integer
-//! logarithms, the random draws of a place are a function of the seed and the number of the place, and where an
-//! exponential or a logarithm is needed, `libm` computes it in software. `toposlam emulate` holds the firmware to a host:
+//! The same input, configuration and seed give the same result, bit for bit, on every target: the paper's weights are sums of
+//! integer logarithms, the robust filter's evidence is computed in single precision with the operations of IEEE 754 in a fixed
+//! order, the random draws of a place are a function of the seed and the number of the place, and where an exponential
+//! or a logarithm is needed, `libm` computes it in software. `toposlam emulate` holds the firmware to a host:
 //! the location at every place, and the whole map at the end.
 //!
 //! # Where the paper is
+//!
+//! [`RobustFilter`], the default, goes beyond the paper; `docs/inference.md` describes it. [`PaperFilter`] is the paper's. Both are a
+//! [`Filter`].
 //!
 //! F. Werner, F. Maire, J. Sitte, H. Choset, S. Tully, G. Kantor: *Topological SLAM using Neighbourhood Information of
 //! Places*. All numbers of equations, definitions and sections are its own.
@@ -118,6 +124,7 @@
 //! | Eq. 6, the weight | `filter/paper/particle.rs` |
 //! | Eq. 7 to 9, its factors | `likelihood.rs` |
 //! | Section III.B, localisation | `filter/mod.rs` ([`Update::vertex`]) |
+//! | Eq. 2, the half from history to map, with its n-gram | `filter/robust/worst.rs` |
 //! | Section IV.A, meet points | `place/` |
 #![cfg_attr(not(test), no_std)]
 #![forbid(unsafe_code)]

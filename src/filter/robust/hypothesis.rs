@@ -1,7 +1,7 @@
 //! One hypothesis: which vertex each observation belongs to, and the map and counts that follow from that.
 
 use super::prices::{EDGE, Prices, VERTEX};
-use super::record::{Entry, Record};
+use super::record::Record;
 use super::tally::Tally;
 use crate::Map;
 use crate::map::bits;
@@ -12,12 +12,6 @@ pub(super) const NOWHERE: u8 = u8::MAX;
 /// The price of a path that stays at one vertex for two places: such a path is never kept.
 const STANDSTILL: f32 = 1e6;
 
-/// What it costs to believe that the robot was carried to another place of a map that is kept as it is, in nats.
-const CARRIED: f32 = 8.0;
-
-/// A loss of evidence by the labels alone that nothing makes up for.
-const HOPELESS: f32 = -30.0;
-
 /// A partition of the newest `T` observations, and of all that came before them, into at most `V` vertices.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Hypothesis<const V: usize, const T: usize> {
@@ -27,9 +21,9 @@ pub(super) struct Hypothesis<const V: usize, const T: usize> {
     /// The vertex of the place before the oldest observation of the record; [`NOWHERE`] when there is none.
     pub(super) before: u8,
     /// How many sequences begin in the record.
-    starts: u16,
+    pub(super) starts: u16,
     /// ln P of all turn hints.
-    hints: f32,
+    pub(super) hints: f32,
     /// The collapsed evidence of map and path.
     pub(super) evidence: f32,
     /// By how much the evidence of the map, all its paths together, exceeds that of this one path, as last computed.
@@ -37,14 +31,14 @@ pub(super) struct Hypothesis<const V: usize, const T: usize> {
     /// Evidence of counts that have faded.
     faded: f32,
     /// Identifies the map; vertices are numbered in the order of their first visit.
-    map_key: u32,
+    pub(super) map_key: u32,
     pub(super) path: [u8; T],
     pub(super) tallies: [Tally; V],
     /// What left the record.
-    settled: [Tally; V],
+    pub(super) settled: [Tally; V],
     pub(super) neighbours: [u32; V],
     /// Edges that were driven before the record begins.
-    settled_neighbours: [u32; V],
+    pub(super) settled_neighbours: [u32; V],
 }
 
 impl<const V: usize, const T: usize> Hypothesis<V, T> {
@@ -111,99 +105,6 @@ impl<const V: usize, const T: usize> Hypothesis<V, T> {
         rows.map(|row| row.count_ones()).sum::<u32>() / 2
     }
 
-    /// How the evidence changes when the newest observation, number `index` of the record, is at a vertex, and the key
-    /// of the map then. A vertex behind the last is a new one.
-    #[inline(never)]
-    pub(super) fn gain(
-        &self,
-        prices: &Prices,
-        record: &Record<T>,
-        index: usize,
-        entry: Entry,
-        vertex: u8,
-    ) -> (f32, u32) {
-        let is_new = vertex == self.vertices;
-        let vertices = self.vertices + u8::from(is_new);
-        let from = if entry.begins() { NOWHERE } else { self.place };
-        let mut seen = self.tally(vertex);
-        seen.include(entry);
-        let mut gain = prices.label_evidence(&seen) - prices.label_evidence(&self.tally(vertex));
-        let degree = self.degree(vertex);
-        let mut map_key = self.map_key;
-        let mut degree_then = degree;
-        if from == NOWHERE {
-            let starts = f32::from(self.starts);
-            gain -= (starts + 1.0) * ln(vertices) - starts * ln(self.vertices.max(1));
-        } else {
-            let mut left = self.tally(from);
-            let before = prices.exit_evidence(&left, self.degree(from));
-            left.exits += 1;
-            let is_new_edge = self.row(from) >> (vertex & 31) & 1 == 0;
-            gain += prices.exit_evidence(&left, self.degree(from) + u32::from(is_new_edge)) - before;
-            if is_new_edge {
-                gain -= EDGE;
-                degree_then += 1;
-                map_key ^= edge_key(from, vertex);
-            }
-            gain += self.hint(prices, record, index, entry, vertex);
-            if is_new {
-                gain -= f32::from(self.starts) * (ln(vertices) - ln(self.vertices));
-            }
-        }
-        if degree_then != degree || entry.degree() > 0 {
-            gain += prices.exit_evidence(&seen, degree_then) - prices.exit_evidence(&self.tally(vertex), degree);
-        }
-        if is_new {
-            gain -= VERTEX;
-        }
-        (gain, keyed(map_key, vertices, vertex))
-    }
-
-    /// Whether a vertex for observation `index` is the place before the last.
-    fn goes_back(&self, index: usize, vertex: u8) -> bool {
-        match index {
-            0 => false,
-            1 => self.before == vertex,
-            _ => self.at(index - 2) == vertex,
-        }
-    }
-
-    /// As [`Hypothesis::gain`], for a map that is kept as it is: how well the newest observation fits a vertex, and what the
-    /// way there costs. Where there is no edge the robot may have been carried.
-    #[inline(never)]
-    pub(super) fn arrival(
-        &self,
-        prices: &Prices,
-        record: &Record<T>,
-        index: usize,
-        entry: Entry,
-        vertex: u8,
-    ) -> (f32, u32) {
-        let tally = self.tally(vertex);
-        let mut seen = tally;
-        seen.include(entry);
-        let fit = prices.label_evidence(&seen) - prices.label_evidence(&tally)
-            + prices.degree(entry.degree(), prices.likely_degree(&tally, self.degree(vertex)));
-        let way = if self.place == NOWHERE || entry.begins() {
-            -ln(self.vertices)
-        } else if self.is_edge(self.place, vertex) {
-            let ways = prices.likely_degree(&self.tally(self.place), self.degree(self.place));
-            self.hint(prices, record, index, entry, vertex) - libm::logf(ways as f32)
-        } else {
-            -ln(self.vertices) - CARRIED
-        };
-        (fit + way, keyed(self.map_key, self.vertices, vertex))
-    }
-
-    /// Takes the newest observation as one of a vertex of a map that is kept as it is.
-    pub(super) fn arrive(&mut self, index: usize, vertex: u8, gain: f32) {
-        self.evidence += gain;
-        if let Some(slot) = self.path.get_mut(index) {
-            *slot = vertex;
-        }
-        self.place = vertex;
-    }
-
     pub(super) fn is_edge(&self, a: u8, b: u8) -> bool {
         self.row(a) >> (b & 31) & 1 == 1
     }
@@ -227,47 +128,6 @@ impl<const V: usize, const T: usize> Hypothesis<V, T> {
                 *row = map.neighbours(vertex) as u32 & !(1 << (vertex & 31));
             }
         }
-    }
-
-    /// Takes the newest observation, number `index` of the record, as one of a vertex, for a gain that was computed before.
-    pub(super) fn extend(
-        &mut self,
-        prices: &Prices,
-        record: &Record<T>,
-        index: usize,
-        entry: Entry,
-        vertex: u8,
-        gain: f32,
-    ) {
-        self.evidence += gain;
-        if vertex == self.vertices {
-            self.vertices += 1;
-        }
-        if entry.begins() || self.place == NOWHERE {
-            self.starts = self.starts.saturating_add(1);
-        } else {
-            self.hints += self.hint(prices, record, index, entry, vertex);
-            if let Some(left) = self.tallies.get_mut(usize::from(self.place)) {
-                left.exits = left.exits.saturating_add(1);
-            }
-            if self.row(self.place) >> (vertex & 31) & 1 == 0 {
-                self.map_key ^= edge_key(self.place, vertex);
-                join(&mut self.neighbours, self.place, vertex);
-            }
-        }
-        if let Some(tally) = self.tallies.get_mut(usize::from(vertex)) {
-            tally.include(entry);
-        }
-        if let Some(slot) = self.path.get_mut(index) {
-            *slot = vertex;
-        }
-        self.place = vertex;
-    }
-
-    /// ln P of the turn hint of observation `index`, were it at a vertex.
-    pub(super) fn hint(&self, prices: &Prices, record: &Record<T>, index: usize, entry: Entry, vertex: u8) -> f32 {
-        let begins_before = index.checked_sub(1).and_then(|before| record.get(before)).is_some_and(Entry::begins);
-        if entry.begins() || begins_before { 0.0 } else { prices.turn(entry.turn(), self.goes_back(index, vertex)) }
     }
 
     /// Takes leave of the oldest observation: its counts stay. Tells whether counts have faded, so that the hypothesis has to
@@ -401,85 +261,6 @@ impl<const V: usize, const T: usize> Hypothesis<V, T> {
         self.vertices = named;
     }
 
-    /// Makes one vertex of two, in the path and in what left the record; the path may then hold the vertex twice in a row.
-    pub(super) fn merge(&mut self, kept: u8, gone: u8, len: usize) {
-        self.path.iter_mut().take(len).filter(|vertex| **vertex == gone).for_each(|vertex| *vertex = kept);
-        if self.before == gone {
-            self.before = kept;
-        }
-        let (Some(&tally), Some(&row)) =
-            (self.settled.get(usize::from(gone)), self.settled_neighbours.get(usize::from(gone)))
-        else {
-            return;
-        };
-        if let Some(settled) = self.settled.get_mut(usize::from(kept)) {
-            settled.add(&tally);
-        }
-        if let Some(settled) = self.settled.get_mut(usize::from(gone)) {
-            *settled = Tally::NONE;
-        }
-        for neighbour in bits(u64::from(row)) {
-            join(&mut self.settled_neighbours, kept, neighbour);
-            if let Some(row) = self.settled_neighbours.get_mut(usize::from(neighbour)) {
-                *row &= !(1 << (gone & 31));
-            }
-        }
-        if let Some(row) = self.settled_neighbours.get_mut(usize::from(gone)) {
-            *row = 0;
-        }
-    }
-
-    /// How the evidence changes when two vertices that are no neighbours become one, but for the turn hints; −∞ for
-    /// neighbours.
-    pub(super) fn merge_gain(&self, prices: &Prices, a: u8, b: u8) -> f32 {
-        if self.row(a) >> (b & 31) & 1 == 1 {
-            return f32::NEG_INFINITY;
-        }
-        let (one, other) = (self.tally(a), self.tally(b));
-        let mut merged = one;
-        merged.add(&other);
-        let (row_a, row_b) = (self.row(a), self.row(b));
-        let mut gain = prices.label_evidence(&merged) - prices.label_evidence(&one) - prices.label_evidence(&other);
-        if gain < HOPELESS {
-            return gain;
-        }
-        gain += prices.exit_evidence(&merged, (row_a | row_b).count_ones())
-            - prices.exit_evidence(&one, row_a.count_ones())
-            - prices.exit_evidence(&other, row_b.count_ones());
-        for neighbour in bits(u64::from(row_a & row_b)) {
-            let tally = self.tally(neighbour);
-            let degree = self.degree(neighbour);
-            gain += EDGE + prices.exit_evidence(&tally, degree - 1) - prices.exit_evidence(&tally, degree);
-        }
-        gain + VERTEX + f32::from(self.starts) * (ln(self.vertices) - ln(self.vertices.max(2) - 1))
-    }
-
-    /// Makes one vertex of two in everything but the numbers of the others; a path that visits both in a row then stays.
-    pub(super) fn unite(&mut self, kept: u8, gone: u8, len: usize) {
-        self.merge(kept, gone, len);
-        self.tally_merged(kept, gone);
-        if let Some(tally) = self.tallies.get_mut(usize::from(gone)) {
-            *tally = Tally::NONE;
-        }
-        if let Some(row) = self.neighbours.get_mut(usize::from(gone)) {
-            *row = 0;
-        }
-    }
-
-    /// Counts what was merged together, before the path is found anew.
-    pub(super) fn tally_merged(&mut self, kept: u8, gone: u8) {
-        let merged = self.tally(gone);
-        if let Some(tally) = self.tallies.get_mut(usize::from(kept)) {
-            tally.add(&merged);
-        }
-        for neighbour in bits(u64::from(self.row(gone))).filter(|&neighbour| neighbour != kept) {
-            join(&mut self.neighbours, kept, neighbour);
-        }
-        for row in &mut self.neighbours {
-            *row &= !(1 << (gone & 31));
-        }
-    }
-
     /// Whether a vertex was only visited in the record, so that it can go without a trace.
     pub(super) fn is_recent(&self, vertex: u8) -> bool {
         self.settled.get(usize::from(vertex)).is_some_and(|tally| tally.visits == 0) && self.before != vertex
@@ -490,7 +271,7 @@ impl<const V: usize, const T: usize> Hypothesis<V, T> {
     }
 }
 
-fn join(rows: &mut [u32], a: u8, b: u8) {
+pub(super) fn join(rows: &mut [u32], a: u8, b: u8) {
     for (from, to) in [(a, b), (b, a)] {
         if let Some(row) = rows.get_mut(usize::from(from)) {
             *row |= 1 << (to & 31);
@@ -498,7 +279,7 @@ fn join(rows: &mut [u32], a: u8, b: u8) {
     }
 }
 
-fn ln(count: u8) -> f32 {
+pub(super) fn ln(count: u8) -> f32 {
     libm::logf(f32::from(count))
 }
 
@@ -508,10 +289,10 @@ fn mix(value: u32) -> u32 {
     value ^ value >> 16
 }
 
-fn edge_key(a: u8, b: u8) -> u32 {
+pub(super) fn edge_key(a: u8, b: u8) -> u32 {
     mix(0x1_0000 | u32::from(a.min(b)) << 8 | u32::from(a.max(b)))
 }
 
-fn keyed(map_key: u32, vertices: u8, place: u8) -> u32 {
+pub(super) fn keyed(map_key: u32, vertices: u8, place: u8) -> u32 {
     map_key ^ mix(0x2_0000 | u32::from(vertices) << 8 | u32::from(place))
 }

@@ -10,6 +10,7 @@ mod beam;
 mod config;
 mod decode;
 mod forward;
+mod growth;
 mod hypothesis;
 mod lattice;
 mod merges;
@@ -20,6 +21,7 @@ mod prices;
 mod record;
 mod splits;
 mod tally;
+mod union;
 mod worst;
 
 pub use config::RobustConfig;
