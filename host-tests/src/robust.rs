@@ -8,7 +8,7 @@
 //! S = Σ_v ln labels(v)  +  Σ_v ln exits(v)  +  Σ_t ln turn(t)  -  sequences · ln K  -  VERTEX · K  -  EDGE · E
 //! ```
 //!
-//! [`ln_labels`], [`ln_exits`], [`ln_turn`] give the terms. To it comes a share of [`Weighed::surplus`], what the other
+//! [`ln_labels`], [`ln_exits`], [`ln_turn`] give the terms. To it comes a share of [`AllPaths::surplus`], what the other
 //! paths through the same map add. Labels are counted in steps of 2 mm; logarithms are natural.
 
 use std::collections::BTreeSet;
