@@ -300,7 +300,7 @@ fn robust<const N: usize, const V: usize, const HISTORY: usize>(filter: &mut Rob
     }
     let map = *filter.map();
     let restarted = filter.start_with_map(RobustConfig::default().opaque(), black_box(1), black_box(&map));
-    black_box((restarted, filter.evidence(), filter.noise_mm()));
+    let _ = black_box((restarted, filter.evidence(), filter.noise_mm()));
     black_box((filter.map(), filter.observed(), filter.faults(), filter.renamed(black_box(3)), filter.worst()));
     black_box((filter.place_probability_q16(black_box(3)), filter.map_probability_q16()));
     for vertex in filter.path() {
