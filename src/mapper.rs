@@ -3,7 +3,7 @@
 use crate::place::{Place, PlaceConfig, PlaceConfigError, PlaceDetector};
 use crate::ring::{RingFrame, RingGeometry};
 use crate::wire::{Capacities, Hello, Message, QueueFull, Reporter};
-use crate::{ConfigError, FaultCounters, Filter, Fingerprint, Map, Observation, Turn, Update};
+use crate::{ConfigError, FaultCounters, Filter, Map, Observation, Turn, Update};
 use core::fmt;
 
 /// How often the robot introduces itself, in ring frames.
@@ -48,15 +48,7 @@ impl<const SONARS: usize, const V: usize, F: Filter<V>> Mapper<SONARS, V, F> {
     pub fn start(&mut self, config: &MapperConfig<SONARS, F::Config>) -> Result<(), MapperError> {
         self.detector.start(config.place, config.geometry).map_err(MapperError::Place)?;
         self.filter.start(config.filter, config.seed).map_err(MapperError::Filter)?;
-        let filter = F::capacities(&config.filter);
-        let capacities = Capacities {
-            vertices: V as u8,
-            hypotheses: filter.hypotheses,
-            history: filter.history,
-            ngram_length: filter.ngram_length,
-            fingerprint_step_mm: Fingerprint::STEP_MM as u8,
-            sonars: SONARS as u8,
-        };
+        let capacities = Capacities::new(V as u8, F::capacities(&config.filter), SONARS as u8);
         self.reporter.start(Hello::new(config.boot, config.seed, capacities), FRAMES_PER_HELLO);
         Ok(())
     }

@@ -245,15 +245,7 @@ fn main() -> ! {
     let [turn_costs, costs, both_costs, large_costs, paper_costs, report_costs] = COSTS.take();
     let slices = SLICE_COSTS.take();
     let mut wire = Wire { reporter: REPORTER.take(), encoder: Encoder::new(0), costs: report_costs, largest_bytes: 0 };
-    let capacities = Filter::capacities(&reference::FILTER);
-    let capacities = Capacities {
-        vertices: VERTICES as u8,
-        hypotheses: capacities.hypotheses,
-        history: capacities.history,
-        ngram_length: capacities.ngram_length,
-        fingerprint_step_mm: Fingerprint::STEP_MM as u8,
-        sonars: SONARS as u8,
-    };
+    let capacities = Capacities::new(VERTICES as u8, Filter::capacities(&reference::FILTER), SONARS as u8);
     wire.reporter.start(Hello::new(0, reference::SEED, capacities), u16::MAX);
 
     let places_detected = detect(clock, DETECTOR.take(), detector_costs);

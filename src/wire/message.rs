@@ -5,7 +5,7 @@ use core::fmt;
 use serde::{Deserialize, Serialize};
 
 use super::{Belief, Echoes, Renamed, Worst};
-use crate::Update;
+use crate::{FilterCapacities, Fingerprint, Update};
 
 /// The version of the message set; it grows by one whenever messages are appended.
 pub const PROTOCOL_VERSION: u16 = 2;
@@ -138,6 +138,15 @@ pub struct Capacities {
     pub fingerprint_step_mm: u8,
     /// The number of sonars in the ring.
     pub sonars: u8,
+}
+
+impl Capacities {
+    /// What a robot has room for whose maps have so many vertices.
+    pub const fn new(vertices: u8, filter: FilterCapacities, sonars: u8) -> Self {
+        let FilterCapacities { hypotheses, history, ngram_length } = filter;
+        let fingerprint_step_mm = Fingerprint::STEP_MM as u8;
+        Self { vertices, hypotheses, history, ngram_length, fingerprint_step_mm, sonars }
+    }
 }
 
 /// Where the robot is.

@@ -30,24 +30,6 @@ pub(super) struct DriveArguments {
     svg: Option<PathBuf>,
 }
 
-/// Which filter makes the map.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub(super) enum FilterArgument {
-    /// The robust filter, which the firmware runs.
-    Robust,
-    /// The filter of the paper.
-    Paper,
-}
-
-impl From<FilterArgument> for FilterChoice {
-    fn from(argument: FilterArgument) -> Self {
-        match argument {
-            FilterArgument::Robust => Self::Robust,
-            FilterArgument::Paper => Self::Paper,
-        }
-    }
-}
-
 /// What the drive tells the filter besides the frames of the ring.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub(super) enum Hints {

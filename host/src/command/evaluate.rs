@@ -1,5 +1,6 @@
 //! `toposlam evaluate`: many random paths through known environments, and how often their maps are right.
 
+use super::filter::FilterArgument;
 use anyhow::{Context, ensure};
 use clap::{Args, ValueEnum};
 use indicatif::{ProgressBar, ProgressStyle};
@@ -103,7 +104,7 @@ struct CourseArguments {
 struct FilterArguments {
     /// The filter to evaluate.
     #[arg(long, default_value = "robust")]
-    filter: FilterChoice,
+    filter: FilterArgument,
     /// How many hypotheses (robust) or particles (paper) the filter keeps, 1 to 100 [default: 10].
     #[arg(long, alias = "particles", value_name = "N")]
     hypotheses: Option<u8>,
@@ -131,14 +132,6 @@ struct FilterArguments {
     /// Paper: phi of Eq. 9, in whole thousandths [default: 0.1].
     #[arg(long, value_name = "PHI", value_parser = permille)]
     penalty: Option<u16>,
-}
-
-#[derive(Clone, Copy, PartialEq, ValueEnum)]
-enum FilterChoice {
-    /// Distinct hypotheses with repair moves.
-    Robust,
-    /// The particle filter of the paper, Eq. 2 to 9.
-    Paper,
 }
 
 #[derive(Clone, Copy, ValueEnum)]
@@ -309,8 +302,8 @@ impl FilterArguments {
             return Ok(vec![self.robust(), self.paper()]);
         }
         let (filter, other, foreign) = match self.filter {
-            FilterChoice::Robust => (self.robust(), "paper", of_paper),
-            FilterChoice::Paper => (self.paper(), "robust", of_robust),
+            FilterArgument::Robust => (self.robust(), "paper", of_paper),
+            FilterArgument::Paper => (self.paper(), "robust", of_robust),
         };
         let given = foreign.iter().find(|(_, given)| *given);
         ensure!(given.is_none(), "{} needs --filter {other}", given.map_or("", |(name, _)| name));

@@ -1,7 +1,9 @@
-//! The subcommands, a file each: its arguments and what it does with them. `drive` is what two of them share.
+//! The subcommands, a file each: its arguments and what it does with them. `drive` is what two of them share,
+//! `filter` what three of them let choose.
 
 mod drive;
 pub(crate) mod emulate;
 pub(crate) mod evaluate;
+mod filter;
 pub(crate) mod replay;
 pub(crate) mod simulate;

@@ -9,7 +9,7 @@ use toposlam::Map;
 use toposlam_host::mapping::Mapping;
 use toposlam_host::recording::{Ring, fault_lines};
 
-use super::drive::FilterArgument;
+use super::filter::FilterArgument;
 
 /// Arguments of `toposlam replay`.
 #[derive(Args)]

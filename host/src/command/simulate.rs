@@ -2,7 +2,8 @@
 
 use clap::Args;
 
-use super::drive::{Drive, DriveArguments, FilterArgument, Hints, progress_bar};
+use super::drive::{Drive, DriveArguments, Hints, progress_bar};
+use super::filter::FilterArgument;
 
 /// Arguments of `toposlam simulate`.
 #[derive(Args)]

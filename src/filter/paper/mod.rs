@@ -11,11 +11,10 @@ pub use config::Config;
 pub use particle::Particle;
 pub use prior::Prior;
 
-use super::{ConfigError, Update};
+use super::{ConfigError, Update, draws};
 use crate::{Consistency, FaultCounters, FaultKind, Fingerprint, History, Map, NgramLength};
 use particles::{Particles, Step};
-use rand_core::{Rng, SeedableRng};
-use rand_xoshiro::Xoshiro128PlusPlus;
+use rand_core::Rng;
 
 /// The particle filter of the paper with at most `N` particles, maps of at most `V` vertices, and the newest
 /// `32 · WORDS` observations as evidence.
@@ -121,11 +120,9 @@ impl<const N: usize, const V: usize, const WORDS: usize> PaperFilter<N, V, WORDS
         self.finish(step)
     }
 
-    /// The random draws for the next place: a function of the seed and the number of the place alone, so that a filter
-    /// that is restored goes on as it would have.
+    /// The random draws for the next place.
     fn random(&self) -> impl FnMut() -> u32 + use<N, V, WORDS> {
-        let place_seed = self.seed.wrapping_add(u64::from(self.observed).wrapping_mul(0x9E37_79B9_7F4A_7C15));
-        let mut random = Xoshiro128PlusPlus::seed_from_u64(place_seed);
+        let mut random = draws(self.seed, self.observed.into());
         move || random.next_u32()
     }
 

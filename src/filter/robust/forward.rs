@@ -5,8 +5,8 @@
 //! map (the variational bound with the labels' posterior held at what the path says). It needs no second pass.
 
 use super::hypothesis::{Hypothesis, NOWHERE};
-use super::lattice::{Column, Model, WIDTH};
-use super::prices::Prices;
+use super::lattice::{Column, Model, WIDTH, Weighing};
+use super::prices::{Prices, SURPLUS_SHARE};
 use super::record::Record;
 
 /// Products of likelihoods are turned into logarithms when they leave this range.
@@ -25,9 +25,21 @@ impl<const V: usize> Forward<V> {
         Self { cells: [[[0.0; WIDTH]; WIDTH]; 2], belief: [0.0; V] }
     }
 
+    /// Computes how much the map of a hypothesis gains from its other paths, and the distribution of its newest place.
+    pub(super) fn soften<const T: usize>(
+        &mut self,
+        prices: &Prices,
+        record: &Record<T>,
+        model: &mut Model<V>,
+        hypothesis: &mut Hypothesis<V, T>,
+    ) {
+        model.read(prices, record, hypothesis, Weighing::Expected);
+        hypothesis.surplus = SURPLUS_SHARE * self.surplus(prices, record, model, hypothesis);
+    }
+
     /// −ln of the probability of the path of a hypothesis among all paths of its map, 0 or more. Leaves the distribution
     /// of the newest place in `belief`. Cost: O(T · (V + WIDTH²)).
-    pub(super) fn surplus<const T: usize>(
+    fn surplus<const T: usize>(
         &mut self,
         prices: &Prices,
         record: &Record<T>,

@@ -35,7 +35,7 @@ impl<const V: usize, const T: usize> Hypothesis<V, T> {
             let mut left = self.tally(from);
             let before = prices.exit_evidence(&left, self.degree(from));
             left.exits += 1;
-            let is_new_edge = self.row(from) >> (vertex & 31) & 1 == 0;
+            let is_new_edge = !self.is_edge(from, vertex);
             gain += prices.exit_evidence(&left, self.degree(from) + u32::from(is_new_edge)) - before;
             if is_new_edge {
                 gain -= EDGE;
@@ -122,7 +122,7 @@ impl<const V: usize, const T: usize> Hypothesis<V, T> {
             if let Some(left) = self.tallies.get_mut(usize::from(self.place)) {
                 left.exits = left.exits.saturating_add(1);
             }
-            if self.row(self.place) >> (vertex & 31) & 1 == 0 {
+            if !self.is_edge(self.place, vertex) {
                 self.map_key ^= edge_key(self.place, vertex);
                 join(&mut self.neighbours, self.place, vertex);
             }

@@ -109,8 +109,8 @@ impl<const V: usize, const T: usize> Hypothesis<V, T> {
         self.row(a) >> (b & 31) & 1 == 1
     }
 
-    /// What is known of the map alone identifies it, wherever the robot is.
-    pub(super) fn map_key(&self) -> u32 {
+    /// Identifies the map, wherever the robot is.
+    pub(super) fn map_alone_key(&self) -> u32 {
         keyed(self.map_key, self.vertices, 0)
     }
 
@@ -217,7 +217,8 @@ impl<const V: usize, const T: usize> Hypothesis<V, T> {
         self.faded + self.factors(prices).iter().sum::<f32>()
     }
 
-    /// The factors of the evidence, but for what has faded: of the labels, of the moves between places, and of the size of the map.
+    /// The factors of the evidence, but for what has faded: of the labels, of the moves between places, and of the size of
+    /// the map.
     pub(super) fn factors(&self, prices: &Prices) -> [f32; 3] {
         let mut labels = 0.0;
         let mut moves = self.hints - f32::from(self.starts) * ln(self.vertices.max(1));

@@ -81,11 +81,11 @@ pub(super) struct Model<const V: usize> {
     emissions: [Emission; V],
     ways: [u32; V],
     /// ln of the probability of each way out of a vertex.
-    pub(super) ln_exit: [f32; V],
-    pub(super) exit: [f32; V],
-    pub(super) neighbours: [u32; V],
+    ln_exit: [f32; V],
+    exit: [f32; V],
+    neighbours: [u32; V],
     /// Edges that were driven more than once.
-    pub(super) firm: [u32; V],
+    firm: [u32; V],
     has_degrees: bool,
 }
 

@@ -108,7 +108,7 @@ impl<const V: usize, const T: usize> Workshop<'_, V, T> {
         if hypothesis.settled_row(kept) >> gone & 1 == 1 {
             return false;
         }
-        let are_adjacent = hypothesis.row(kept) >> gone & 1 == 1;
+        let are_adjacent = hypothesis.is_edge(kept, gone);
         let len = self.record.len();
         hypothesis.merge(kept, gone, len);
         if are_adjacent {

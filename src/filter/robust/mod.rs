@@ -21,25 +21,23 @@ mod prices;
 mod record;
 mod splits;
 mod tally;
+mod tell;
 mod union;
 mod worst;
 
 pub use config::RobustConfig;
 pub(super) use worst::LENGTH as NGRAM_LENGTH;
 
-use super::{ConfigError, Update, WeightFactors, WorstNgram};
-use crate::map::bits;
+use super::{ConfigError, Update, WorstNgram, draws};
 use crate::{FaultCounters, FaultKind, Fingerprint, Map, Observation};
 use beam::Beam;
 use decode::Decoder;
 use forward::Forward;
 use hypothesis::Hypothesis;
-use lattice::{Model, Weighing};
+use lattice::Model;
 use moves::Workshop;
 use names::Names;
 use prices::Prices;
-use rand_core::SeedableRng;
-use rand_xoshiro::Xoshiro128PlusPlus;
 use record::Record;
 
 /// The noise is estimated at every fifth place at first, later at every tenth.
@@ -48,12 +46,6 @@ const NOISE_OFTEN_UNTIL: u32 = 40;
 
 /// How many hypotheses are brought up to date at a place at most, until the best one is.
 const SOFTENED: u8 = 3;
-
-/// One in the unit of probabilities.
-const ONE_Q16: f32 = 65536.0;
-
-/// The largest lead that is told, in nats.
-const LEAD_MAX: f32 = 15.0;
 
 /// The robust filter with at most `N` hypotheses, maps of at most `V` vertices (`V` ≤ 32), and the newest `HISTORY` places
 /// as evidence that moves can still explain in another way; what is older counts as it was decided.
@@ -232,14 +224,13 @@ impl<const N: usize, const V: usize, const HISTORY: usize> RobustFilter<N, V, HI
     }
 
     /// Makes one more move on the hypotheses: for the time between two places, in as many slices as there is time for. The
-    /// next [`RobustFilter::observe`] or [`RobustFilter::refresh`] publishes what came out. Cost: at most seven passes over the record.
+    /// next [`RobustFilter::observe`] or [`RobustFilter::refresh`] publishes what came out. Cost: at most seven passes over
+    /// the record.
     pub fn polish(&mut self) {
         if self.localise_only || self.record.len() < 3 {
             return;
         }
-        let number = u64::from(self.observed) << 16 | u64::from(self.polished & 0xFFFF);
-        let mut random =
-            Xoshiro128PlusPlus::seed_from_u64(self.seed.wrapping_add(number.wrapping_mul(0x9E37_79B9_7F4A_7C15)));
+        let mut random = draws(self.seed, u64::from(self.observed) << 16 | u64::from(self.polished & 0xFFFF));
         let wanted = usize::from(self.config.hypotheses);
         let mut workshop = Workshop {
             prices: &self.prices,
@@ -285,9 +276,7 @@ impl<const N: usize, const V: usize, const HISTORY: usize> RobustFilter<N, V, HI
     fn soften_best(&mut self) {
         for round in 1..=SOFTENED {
             let Some(best) = self.beam.get_mut(0) else { return };
-            self.model.read(&self.prices, &self.record, best, Weighing::Expected);
-            let surplus = self.forward.surplus(&self.prices, &self.record, &self.model, best);
-            best.surplus = prices::SURPLUS_SHARE * surplus;
+            self.forward.soften(&self.prices, &self.record, &mut self.model, best);
             let key = best.key();
             // The last one is told even if another has become the better one by now: its belief is at hand.
             if self.localise_only || round == SOFTENED {
@@ -311,105 +300,6 @@ impl<const N: usize, const V: usize, const HISTORY: usize> RobustFilter<N, V, HI
         let prices = &self.prices;
         self.beam.each(|hypothesis| hypothesis.evidence = hypothesis.total(prices));
         self.beam.sort();
-    }
-
-    /// Tells the best map under the numbers that its vertices are known by.
-    fn publish(&mut self) -> Update {
-        let Some(best) = self.beam.get(0) else { return Update::NONE };
-        if self.localise_only {
-            self.names.hold(&self.record, best);
-        } else {
-            self.names.follow(&self.record, &self.map, best);
-        }
-        self.map.clear();
-        for name in 0..best.vertices {
-            let vertex = (0..best.vertices).find(|&vertex| self.names.name(vertex) == name).unwrap_or(0);
-            let tally = best.tally(vertex);
-            // A map of the same capacity has room for every vertex.
-            let _ = self.map.add_known_vertex(tally.mean_label(), tally.visits.into());
-        }
-        self.belief_q16 = [0; V];
-        for vertex in 0..best.vertices {
-            let name = self.names.name(vertex);
-            for neighbour in bits(best.row(vertex).into()) {
-                self.map.add_edge(name, self.names.name(neighbour));
-            }
-            let probability = self.forward.belief.get(usize::from(vertex)).copied().unwrap_or(0.0);
-            if let Some(belief) = self.belief_q16.get_mut(usize::from(name)) {
-                *belief = (probability * ONE_Q16) as u32;
-            }
-        }
-        self.worst = worst::worst_ngram(&self.record, &self.map, self.names.path());
-        let (mut same, mut all) = (0.0, 0.0);
-        let mut rival = f32::NEG_INFINITY;
-        for hypothesis in self.beam.iter() {
-            let behind = hypothesis.score() - best.score();
-            let weight = libm::expf(behind.min(0.0));
-            all += weight;
-            if hypothesis.map_key() == best.map_key() {
-                same += weight;
-            } else {
-                rival = rival.max(behind);
-            }
-        }
-        self.map_probability_q16 = (same / all * ONE_Q16) as u32;
-        let factors = best.factors(&self.prices);
-        Update {
-            place_index: self.observed.wrapping_sub(1),
-            vertex: self.names.name(best.place),
-            is_new: best.tally(best.place).visits == 1,
-            consistency_mm: self.worst.distance_mm,
-            factors: WeightFactors {
-                ln_label_q16: q16(factors[0]),
-                ln_consistency_q16: q16(factors[1]),
-                ln_size_q16: q16(factors[2]),
-            },
-            lead_q16: q16((-rival).clamp(-LEAD_MAX, LEAD_MAX)),
-            distinct: self.beam.len() as u8,
-        }
-    }
-
-    /// The best map. Its vertices keep their numbers from update to update as far as it goes; see
-    /// [`RobustFilter::renamed`].
-    pub fn map(&self) -> &Map<V> {
-        &self.map
-    }
-
-    /// The vertex that each of the newest `HISTORY` places was taken for, the oldest first, as the best hypothesis saw the
-    /// past at the last update.
-    pub fn path(&self) -> impl Iterator<Item = u8> + '_ {
-        self.names.path().iter().copied().take(self.record.len())
-    }
-
-    /// The probability that the robot is at a vertex of the best map, given that map, in units of 2⁻¹⁶.
-    pub fn place_probability_q16(&self, vertex: u8) -> u32 {
-        self.belief_q16.get(usize::from(vertex)).copied().unwrap_or(0)
-    }
-
-    /// The probability that the best map is right, were one of the hypotheses right, in units of 2⁻¹⁶.
-    pub fn map_probability_q16(&self) -> u32 {
-        self.map_probability_q16
-    }
-
-    /// For each vertex before the last update its number now; `None` when it is gone. A vertex that was merged into
-    /// another has the number of the other.
-    pub fn renamed(&self, before: u8) -> Option<u8> {
-        self.names.renamed(before)
-    }
-
-    /// The n-gram of the history that is farthest from every walk of the best map.
-    pub fn worst(&self) -> WorstNgram {
-        self.worst
-    }
-
-    /// The logarithm of the evidence of the best hypothesis, and what its map gains from other paths, in nats.
-    pub fn evidence(&self) -> (f32, f32) {
-        self.beam.get(0).map_or((0.0, 0.0), |best| (best.evidence, best.surplus))
-    }
-
-    /// The standard deviation of a fingerprint that the filter works with now, in millimetres.
-    pub fn noise_mm(&self) -> f32 {
-        self.prices.noise_steps() * f32::from(Fingerprint::STEP_MM)
     }
 
     /// How many places were observed.
@@ -446,9 +336,4 @@ impl<const N: usize, const V: usize, const HISTORY: usize> Default for RobustFil
     fn default() -> Self {
         Self::new()
     }
-}
-
-/// Nats in units of 2⁻¹⁶; saturates.
-fn q16(nats: f32) -> i32 {
-    (nats * ONE_Q16) as i32
 }

@@ -4,7 +4,7 @@ use super::decode::Decoder;
 use super::forward::Forward;
 use super::hypothesis::Hypothesis;
 use super::lattice::{Model, Weighing};
-use super::prices::{Prices, SURPLUS_SHARE};
+use super::prices::Prices;
 use super::record::Record;
 use rand_core::Rng;
 use rand_xoshiro::Xoshiro128PlusPlus;
@@ -43,14 +43,14 @@ impl<const V: usize, const T: usize> Workshop<'_, V, T> {
         let changed = match self.below(10) {
             0 | 1 if vertices > 2 => self.merge_well(hypothesis),
             2 if vertices > 2 => self.merge(hypothesis),
-            3 if vertices > 2 => {
-                let gone = self.below(vertices) as u8;
-                hypothesis.is_recent(gone) && self.decode(hypothesis, !(1 << gone), false)
-            }
+            3 if vertices > 2 => self.delete(hypothesis),
             4 | 5 | 9 if vertices < V => self.split_by_context(hypothesis),
             6 if vertices < V => self.split_by_label(hypothesis),
             7 | 8 if vertices < V => self.unfold(hypothesis),
-            _ => self.decode(hypothesis, u32::MAX, true),
+            _ => {
+                self.decode(hypothesis, u32::MAX, true);
+                true
+            }
         };
         if !changed {
             return false;
@@ -65,8 +65,18 @@ impl<const V: usize, const T: usize> Workshop<'_, V, T> {
         if hypothesis.score() + SLACK < self.threshold {
             return false;
         }
-        self.soften(hypothesis);
+        self.forward.soften(self.prices, self.record, self.model, hypothesis);
         true
+    }
+
+    /// Leaves the visits of a vertex to the others.
+    fn delete(&mut self, hypothesis: &mut Hypothesis<V, T>) -> bool {
+        let gone = self.below(hypothesis.vertices.into()) as u8;
+        let can_go = hypothesis.is_recent(gone);
+        if can_go {
+            self.decode(hypothesis, !(1 << gone), false);
+        }
+        can_go
     }
 
     /// Decodes the record anew and keeps what comes out when it is better; tells whether it was.
@@ -84,13 +94,8 @@ impl<const V: usize, const T: usize> Workshop<'_, V, T> {
         false
     }
 
-    /// Computes how much the map of a hypothesis gains from its other paths.
-    fn soften(&mut self, hypothesis: &mut Hypothesis<V, T>) {
-        self.model.read(self.prices, self.record, hypothesis, Weighing::Expected);
-        hypothesis.surplus = SURPLUS_SHARE * self.forward.surplus(self.prices, self.record, self.model, hypothesis);
-    }
-
-    pub(super) fn decode(&mut self, hypothesis: &mut Hypothesis<V, T>, allowed: u32, perturbed: bool) -> bool {
+    /// Finds the best path, or, perturbed, draws another one; `allowed` is the bit row of the vertices it may visit.
+    pub(super) fn decode(&mut self, hypothesis: &mut Hypothesis<V, T>, allowed: u32, perturbed: bool) {
         self.model.read(self.prices, self.record, hypothesis, Weighing::Predictive);
         let random = &mut *self.random;
         let jitter = || {
@@ -103,6 +108,5 @@ impl<const V: usize, const T: usize> Workshop<'_, V, T> {
             }
         };
         self.decoder.decode(self.prices, self.record, self.model, allowed, hypothesis, jitter);
-        true
     }
 }

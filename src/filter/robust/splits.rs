@@ -2,6 +2,7 @@
 
 use super::hypothesis::{Hypothesis, NOWHERE};
 use super::moves::Workshop;
+use super::record::Record;
 use rand_core::Rng;
 
 /// How many neighbours of a vertex are parted into groups; further ones stay with the first group.
@@ -19,25 +20,16 @@ impl<const V: usize, const T: usize> Workshop<'_, V, T> {
         }
         let mut passages = [[0_u16; GROUPED]; GROUPED];
         let number = |neighbour: u8| (row & ((1 << (neighbour & 31)) - 1)).count_ones() as usize;
-        let mut before = hypothesis.before;
-        for (index, entry) in self.record.iter().enumerate() {
-            if entry.begins() {
-                before = NOWHERE;
+        for Visit { before, after, .. } in visits(self.record, hypothesis, vertex) {
+            if before == NOWHERE || after == NOWHERE {
+                continue;
             }
-            let here = hypothesis.at(index);
-            if here == vertex && before != NOWHERE {
-                let goes_on = self.record.get(index + 1).is_some_and(|next| !next.begins());
-                let after = hypothesis.at(index + 1);
-                if goes_on {
-                    let (a, b) = (number(before), number(after));
-                    for (a, b) in [(a, b), (b, a)] {
-                        if let Some(count) = passages.get_mut(a).and_then(|row| row.get_mut(b)) {
-                            *count += 1;
-                        }
-                    }
+            let (a, b) = (number(before), number(after));
+            for (a, b) in [(a, b), (b, a)] {
+                if let Some(count) = passages.get_mut(a).and_then(|row| row.get_mut(b)) {
+                    *count += 1;
                 }
             }
-            before = here;
         }
         let grouped = degree.min(GROUPED);
         let first = self.below(grouped);
@@ -72,7 +64,7 @@ impl<const V: usize, const T: usize> Workshop<'_, V, T> {
             }
         }
         let coin = self.random.next_u32();
-        self.split(hypothesis, vertex, |before, after, index, _| {
+        self.split(hypothesis, vertex, |&Visit { before, after, index, .. }| {
             let side = |neighbour: u8| neighbour != NOWHERE && group >> (number(neighbour) & 31) & 1 == 1;
             match (before, after) {
                 (NOWHERE, after) => side(after),
@@ -87,40 +79,51 @@ impl<const V: usize, const T: usize> Workshop<'_, V, T> {
     pub(super) fn split_by_label(&mut self, hypothesis: &mut Hypothesis<V, T>) -> bool {
         let vertex = self.below(hypothesis.vertices.into()) as u8;
         let mean = hypothesis.tally(vertex).mean();
-        self.split(hypothesis, vertex, |_, _, _, steps| f32::from(steps) > mean)
+        self.split(hypothesis, vertex, |visit| f32::from(visit.steps) > mean)
     }
 
-    fn split(
-        &mut self,
-        hypothesis: &mut Hypothesis<V, T>,
-        vertex: u8,
-        leaves: impl Fn(u8, u8, usize, u16) -> bool,
-    ) -> bool {
+    /// Gives the visits that leave a vertex a new one; tells whether there were any.
+    fn split(&mut self, hypothesis: &mut Hypothesis<V, T>, vertex: u8, leaves: impl Fn(&Visit) -> bool) -> bool {
         let fresh = hypothesis.vertices;
-        let mut before = hypothesis.before;
-        let mut moved = 0;
-        for index in 0..self.record.len() {
-            let Some(entry) = self.record.get(index) else { break };
-            if entry.begins() {
-                before = NOWHERE;
+        let mut leaving = [false; T];
+        for visit in visits(self.record, hypothesis, vertex).filter(leaves) {
+            if let Some(leaving) = leaving.get_mut(visit.index) {
+                *leaving = true;
             }
-            let here = hypothesis.at(index);
-            if here == vertex {
-                let goes_on = self.record.get(index + 1).is_some_and(|next| !next.begins());
-                let after = if goes_on { hypothesis.at(index + 1) } else { NOWHERE };
-                if leaves(before, after, index, entry.steps) {
-                    if let Some(slot) = hypothesis.path.get_mut(index) {
-                        *slot = fresh;
-                    }
-                    moved += 1;
-                }
-            }
-            before = here;
         }
-        if moved == 0 {
-            return false;
+        let mut moved = false;
+        for (slot, _) in hypothesis.path.iter_mut().zip(leaving).filter(|(_, leaving)| *leaving) {
+            *slot = fresh;
+            moved = true;
         }
-        hypothesis.vertices += 1;
-        true
+        hypothesis.vertices += u8::from(moved);
+        moved
     }
+}
+
+/// A visit of a vertex.
+struct Visit {
+    index: usize,
+    steps: u16,
+    /// The vertices the robot came from and went to; [`NOWHERE`] where a sequence begins or ends.
+    before: u8,
+    after: u8,
+}
+
+/// The visits of a vertex in the record, the oldest first.
+fn visits<const V: usize, const T: usize>(
+    record: &Record<T>,
+    hypothesis: &Hypothesis<V, T>,
+    vertex: u8,
+) -> impl Iterator<Item = Visit> {
+    record.iter().enumerate().filter(move |&(index, _)| hypothesis.at(index) == vertex).map(move |(index, entry)| {
+        let before = match index.checked_sub(1) {
+            _ if entry.begins() => NOWHERE,
+            None => hypothesis.before,
+            Some(before) => hypothesis.at(before),
+        };
+        let goes_on = record.get(index + 1).is_some_and(|next| !next.begins());
+        let after = if goes_on { hypothesis.at(index + 1) } else { NOWHERE };
+        Visit { index, steps: entry.steps, before, after }
+    })
 }

@@ -40,7 +40,7 @@ impl<const V: usize, const T: usize> Hypothesis<V, T> {
     /// How the evidence changes when two vertices that are no neighbours become one, but for the turn hints; −∞ for
     /// neighbours.
     pub(super) fn merge_gain(&self, prices: &Prices, a: u8, b: u8) -> f32 {
-        if self.row(a) >> (b & 31) & 1 == 1 {
+        if self.is_edge(a, b) {
             return f32::NEG_INFINITY;
         }
         let (one, other) = (self.tally(a), self.tally(b));

@@ -1,0 +1,149 @@
+//! Nothing that a robot may say ends the mapping.
+
+use super::*;
+use common::random::cases;
+use common::watched::Watched;
+use proptest::collection::vec;
+use proptest::prelude::*;
+
+fn seen(radius_mm: u16) -> Observation {
+    Observation::new(Fingerprint::from_radius_mm(radius_mm).unwrap())
+}
+
+#[test]
+fn without_room_for_a_vertex_the_map_goes_on_with_those_it_has() {
+    let environment = six_rooms();
+    let mut robot = Robot::new(&environment, Hints::default(), 1);
+    let mut filter = started::<10, 4, 64>(1);
+    drive(&mut filter, &mut robot, 200);
+    println!("full {}", filter.faults().of(FaultKind::VerticesFull));
+    assert!(filter.faults().of(FaultKind::VerticesFull) > 0);
+    assert_eq!(filter.map().vertices(), 4);
+    assert!(filter.path().all(|vertex| vertex < 4));
+}
+
+#[test]
+fn degrees_that_no_place_has_are_as_good_as_none_or_seven() {
+    let environment = easy();
+    let [none, seven] = [(None, Some(0)), (Some(7), Some(200))].map(|(plain, odd)| {
+        let told = [plain, odd].map(|degree| {
+            let mut robot = Robot::new(&environment, Hints::default(), 2);
+            let mut filter = started::<10, 8, 64>(2);
+            let mut observe = |_| filter.observe(Observation { degree, ..robot.step() });
+            let updates: Vec<_> = (0..60).map(&mut observe).collect();
+            (updates, filter.evidence(), filter.path().collect::<Vec<_>>())
+        });
+        told[0] == told[1]
+    });
+    assert!(none && seven);
+}
+
+#[test]
+fn turns_at_the_first_two_places_of_a_sequence_mean_nothing() {
+    let paths = [None, Some(Turn::Back), Some(Turn::On)].map(|turn| {
+        let environment = easy();
+        let mut robot = Robot::new(&environment, Hints::default(), 3);
+        let mut filter = started::<10, 8, 64>(3);
+        for place in 0..40 {
+            let begins = place == 0 || place == 20;
+            let turn = turn.filter(|_| begins || place == 1 || place == 21);
+            filter.observe(Observation { turn, begins, ..robot.step() });
+        }
+        (filter.evidence(), filter.path().collect::<Vec<_>>())
+    });
+    assert!(paths[0] == paths[1] && paths[0] == paths[2]);
+}
+
+#[test]
+fn a_robot_to_which_every_place_looks_alike_is_told_something_consistent() {
+    for (name, radii_mm) in [
+        ("all alike", vec![1200]),
+        ("two in turn", vec![1200, 2000]),
+        ("no room at all", vec![0]),
+        ("as much room as can be", vec![8188]),
+        ("nothing and all", vec![0, 8188]),
+    ] {
+        let mut watched = Watched::<10, 6, 64>::new(RobustConfig::DEFAULT, 1);
+        for radius_mm in radii_mm.into_iter().cycle().take(60) {
+            watched.observe(seen(radius_mm));
+            watched.filter.polish();
+        }
+        println!("{name}: {} vertices", watched.filter.map().vertices());
+        assert!((2..=3).contains(&watched.filter.map().vertices()), "{name}: a place is not its own neighbour");
+    }
+}
+
+#[test]
+fn a_robot_that_is_carried_to_every_place_has_a_map_without_edges() {
+    let mut watched = Watched::<10, 6, 64>::new(RobustConfig::DEFAULT, 1);
+    for radius_mm in [900, 1300, 1700].into_iter().cycle().take(45) {
+        watched.observe(Observation { begins: true, ..seen(radius_mm) });
+        watched.filter.polish();
+    }
+    assert_eq!(watched.filter.map().vertices(), 3);
+    assert_eq!(watched.filter.map().edges().count(), 0);
+}
+
+/// Anything: labels of a few kinds or of any, hints that contradict each other, sequences of one place.
+fn anything() -> impl Strategy<Value = Observation> {
+    let steps =
+        prop_oneof![4 => (0_u16..4, 0_u16..8).prop_map(|(kind, noise)| 400 + 50 * kind + noise), 1 => 0..=4094_u16];
+    let turn = prop_oneof![2 => Just(None), 1 => Just(Some(Turn::Back)), 1 => Just(Some(Turn::On))];
+    let degree = prop_oneof![2 => Just(None), 2 => (1_u8..5).prop_map(Some), 1 => any::<u8>().prop_map(Some)];
+    (steps, turn, degree, prop::bool::weighted(0.1)).prop_map(|(steps, turn, degree, begins)| {
+        let fingerprint = Fingerprint::from_steps(steps).unwrap();
+        Observation { fingerprint, turn, degree, begins }
+    })
+}
+
+fn config() -> impl Strategy<Value = RobustConfig> {
+    (prop_oneof![Just(1_u16), Just(30), Just(1000)], 0_u8..4, 1_u16..=500, 1_u16..=500).prop_map(
+        |(noise_mm, moves, wrong_turn_permille, wrong_degree_permille)| RobustConfig {
+            hypotheses: 1,
+            noise_mm,
+            moves,
+            wrong_turn_permille,
+            wrong_degree_permille,
+            ..RobustConfig::DEFAULT
+        },
+    )
+}
+
+fn bears<const N: usize, const V: usize>(config: RobustConfig, observations: &[(Observation, u8)], seed: u64) {
+    let config = RobustConfig { hypotheses: N as u8, ..config };
+    let mut watched = Watched::<N, V, 8>::new(config, seed);
+    for (observation, polish) in observations {
+        watched.observe(*observation);
+        (0..*polish).for_each(|_| watched.filter.polish());
+    }
+    // In the middle of it all the filter is told to keep its map.
+    watched.filter.set_localise_only(true);
+    for (observation, _) in observations.iter().take(12) {
+        watched.filter.observe(*observation);
+    }
+    watched.filter.set_localise_only(false);
+    for (observation, _) in observations.iter().take(12) {
+        watched.filter.observe(*observation);
+        watched.filter.polish();
+    }
+    assert!(watched.filter.path().all(|vertex| vertex < watched.filter.map().vertices()));
+}
+
+proptest! {
+    #![proptest_config(cases(300))]
+
+    #[test]
+    fn the_smallest_filters_bear_anything(
+        config in config(),
+        observations in vec((anything(), 0_u8..4), 1..40),
+        seed in any::<u64>(),
+        size in 0..4,
+    ) {
+        match size {
+            0 => bears::<1, 2>(config, &observations, seed),
+            1 => bears::<2, 3>(config, &observations, seed),
+            2 => bears::<3, 4>(config, &observations, seed),
+            _ => bears::<3, 2>(config, &observations, seed),
+        }
+    }
+}

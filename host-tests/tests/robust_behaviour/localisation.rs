@@ -1,0 +1,158 @@
+//! A robot with a map finds where it is.
+
+use super::*;
+
+/// The map of an environment, every place seen so often.
+fn known<const V: usize>(environment: &Environment, visits: u32) -> Map<V> {
+    let mut map = Map::new();
+    for place in environment.places() {
+        let label = Fingerprint::from_radius_mm(place.mean_mm.round() as u16).unwrap();
+        let vertex = map.add_vertex(label).unwrap();
+        (1..visits).for_each(|_| map.observe(vertex, label));
+    }
+    environment.graph().edges().iter().for_each(|&(a, b)| map.add_edge(a as u8, b as u8));
+    map
+}
+
+type Localiser = Box<RobustFilter<10, 16, 64>>;
+
+fn localiser(environment: &Environment, seed: u64) -> Localiser {
+    let mut filter = Localiser::new(RobustFilter::new());
+    let config = RobustConfig { noise_mm: 15, ..RobustConfig::DEFAULT };
+    filter.start_with_map(config, seed, &known(environment, 20)).unwrap();
+    filter.set_localise_only(true);
+    filter
+}
+
+fn look_around(filter: &mut Localiser, robot: &mut Robot) {
+    for _ in 0..30 {
+        filter.observe(robot.step());
+    }
+}
+
+/// The vertex whose number is that of its place.
+fn is_found(filter: &Localiser, robot: &Robot) -> bool {
+    let place = *robot.walk.last().unwrap() as u8;
+    f64::from(filter.place_probability_q16(place)) > 0.9 * 65536.0 && filter.path().last() == Some(place)
+}
+
+/// After how many places the robot knows where it is, and is right.
+fn places_until_found(filter: &mut Localiser, robot: &mut Robot) -> usize {
+    (1..=40)
+        .find(|_| {
+            filter.observe(robot.step());
+            is_found(filter, robot)
+        })
+        .unwrap_or(usize::MAX)
+}
+
+fn summary(name: &str, places: &[usize]) -> (f64, usize) {
+    let mean = places.iter().map(|&places| places.min(1000) as f64).sum::<f64>() / places.len() as f64;
+    let most = places.iter().copied().max().unwrap();
+    println!("{name}: {mean:.2} places on average, at most {most}: {places:?}");
+    (mean, most)
+}
+
+#[test]
+fn a_robot_with_a_map_finds_itself_within_a_few_places() {
+    for (name, environment, most_mean) in [("six rooms", six_rooms(), 4.0), ("floor", floor(), 6.0)] {
+        for (hints, with) in [(Hints::default(), "no hints"), (TURNS, "turns")] {
+            let find = |seed| {
+                let mut robot = Robot::new(&environment, hints, seed);
+                let mut filter = localiser(&environment, seed);
+                let before = *filter.map();
+                let places = places_until_found(&mut filter, &mut robot);
+                assert!(filter.map().edges().eq(before.edges()) && filter.map().labels() == before.labels());
+                assert_eq!(filter.map().vertices(), before.vertices());
+                places
+            };
+            let places: Vec<usize> = (0..60).map(find).collect();
+            let (mean, most) = summary(&format!("{name}, {with}"), &places);
+            assert!(mean <= most_mean && most <= 15);
+        }
+    }
+}
+
+/// For each of 60 robots, after how many places it is found that was carried off.
+fn carried_off(environment: &Environment, is_told: bool) -> Vec<usize> {
+    let kidnap = |seed| {
+        let mut robot = Robot::new(environment, Hints::default(), seed);
+        let mut filter = localiser(environment, seed);
+        look_around(&mut filter, &mut robot);
+        robot.carry_off(is_told);
+        places_until_found(&mut filter, &mut robot)
+    };
+    (0..60).map(kidnap).collect()
+}
+
+#[test]
+fn a_robot_that_says_it_was_carried_off_finds_itself_within_a_few_places() {
+    for (name, environment) in [("six rooms", six_rooms()), ("floor", floor())] {
+        let (mean, most) = summary(&format!("{name}, carried off, told"), &carried_off(&environment, true));
+        assert!(mean <= 4.0 && most <= 15);
+    }
+}
+
+#[test]
+fn a_robot_that_was_carried_off_unawares_finds_itself_again() {
+    for (name, environment, most_mean) in [("six rooms", six_rooms(), 5.0), ("floor", floor(), 15.0)] {
+        let places: Vec<usize> = carried_off(&environment, false).into_iter().map(|places| places.min(40)).collect();
+        let (mean, _) = summary(&format!("{name}, carried off, not told"), &places);
+        assert!(mean <= most_mean);
+    }
+}
+
+#[test]
+fn a_carriage_that_is_noticed_late_leaves_no_edge_on_the_map() {
+    let environment = six_rooms();
+    let is_exact = |&seed: &u64| {
+        let mut robot = Robot::new(&environment, Hints::default(), seed);
+        let mut filter = localiser(&environment, seed);
+        look_around(&mut filter, &mut robot);
+        robot.carry_off(false);
+        look_around(&mut filter, &mut robot);
+        filter.set_localise_only(false);
+        drive(&mut filter, &mut robot, 30);
+        robot.is_all_mapped_by(&*filter)
+    };
+    let exact = (0..60).filter(is_exact).count();
+    println!("{exact} of 60 exact");
+    assert!(exact >= 57, "{exact}");
+}
+
+#[test]
+fn a_robot_that_stops_localising_maps_on() {
+    let environment = six_rooms();
+    for seed in 0..5 {
+        let mut robot = Robot::new(&environment, Hints::default(), seed);
+        let mut filter = localiser(&environment, seed);
+        look_around(&mut filter, &mut robot);
+        let visits = |filter: &Localiser| (0..6).map(|vertex| filter.map().visits(vertex)).sum::<u32>();
+        filter.set_localise_only(false);
+        drive(&mut filter, &mut robot, 30);
+        assert!(robot.is_all_mapped_by(&*filter), "seed {seed}: {:?}", filter.map().edges().collect::<Vec<_>>());
+        assert_eq!(visits(&filter), 6 * 20 + 60, "seed {seed}: what was seen meanwhile counts");
+        // A place that is on no map: a corridor wide as nothing else.
+        let new = Fingerprint::from_radius_mm(5000).unwrap();
+        for _ in 0..8 {
+            filter.observe(new);
+            (0..POLISH).for_each(|_| filter.polish());
+            let back = environment.places()[*robot.walk.last().unwrap()].mean_mm as u16;
+            filter.observe(Fingerprint::from_radius_mm(back).unwrap());
+        }
+        assert!(filter.map().labels().contains(&new), "seed {seed}: {:?}", filter.map());
+    }
+}
+
+#[test]
+fn a_map_that_is_kept_as_it_is_has_no_room_for_what_is_new() {
+    let environment = six_rooms();
+    let mut filter = localiser(&environment, 1);
+    let before = *filter.map();
+    for radius_mm in [0, 8188, 5000, 1, 4000, 8188, 8188] {
+        filter.observe(Fingerprint::from_radius_mm(radius_mm).unwrap());
+        filter.polish();
+    }
+    assert!(filter.map().edges().eq(before.edges()) && filter.map().labels() == before.labels());
+    assert_eq!(filter.faults().of(FaultKind::VerticesFull), 0);
+}
