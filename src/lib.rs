@@ -129,9 +129,11 @@
 #![cfg_attr(not(test), no_std)]
 #![forbid(unsafe_code)]
 
+mod bearing;
 mod consistency;
 #[cfg(feature = "defmt")]
 mod defmt;
+pub mod drive;
 mod fault;
 mod filter;
 mod fingerprint;

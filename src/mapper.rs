@@ -89,6 +89,11 @@ impl<const SONARS: usize, const V: usize, F: Filter<V>> Mapper<SONARS, V, F> {
         seen
     }
 
+    /// The robot has not moved from the place that was reported last; see [`PlaceDetector::stay`].
+    pub fn stay(&mut self) {
+        self.detector.stay();
+    }
+
     /// The best map.
     pub fn map(&self) -> &Map<V> {
         self.filter.map()

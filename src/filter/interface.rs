@@ -47,6 +47,10 @@ pub trait Filter<const V: usize>: Sized {
     /// What went wrong since the start: full tables.
     fn faults(&self) -> &FaultCounters;
 
+    /// The vertex of a place by the best path, so many places ago, 0 for the newest; `None` when the filter does not
+    /// remember that.
+    fn recent(&self, ago: usize) -> Option<u8>;
+
     /// The probability that the robot is at a vertex of the best map.
     fn place_probability_q16(&self, vertex: u8) -> u32;
 
@@ -94,6 +98,10 @@ impl<const N: usize, const V: usize, const HISTORY: usize> Filter<V> for RobustF
         self.faults()
     }
 
+    fn recent(&self, ago: usize) -> Option<u8> {
+        self.recent(ago)
+    }
+
     fn place_probability_q16(&self, vertex: u8) -> u32 {
         self.place_probability_q16(vertex)
     }
@@ -112,7 +120,7 @@ impl<const N: usize, const V: usize, const HISTORY: usize> Filter<V> for RobustF
 }
 
 /// The paper's filter reads the fingerprint alone. Its best particle is certain of its place, and the share of the draws
-/// that chose it stands for the probability of its map. Vertices keep their numbers within a particle and mean nothing in
+/// that chose it stands for the probability of its map. It remembers no path, only where it is. Vertices keep their numbers within a particle and mean nothing in
 /// another one, so no vertex is told to be another. It knows how far its map is from the history, not which n-gram is.
 impl<const N: usize, const V: usize, const WORDS: usize> Filter<V> for PaperFilter<N, V, WORDS> {
     type Config = Config;
@@ -141,6 +149,10 @@ impl<const N: usize, const V: usize, const WORDS: usize> Filter<V> for PaperFilt
 
     fn faults(&self) -> &FaultCounters {
         self.faults()
+    }
+
+    fn recent(&self, ago: usize) -> Option<u8> {
+        (self.observed() > 0 && ago == 0).then(|| self.best().place)
     }
 
     fn place_probability_q16(&self, vertex: u8) -> u32 {

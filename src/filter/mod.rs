@@ -14,7 +14,7 @@ use rand_xoshiro::Xoshiro128PlusPlus;
 
 /// The random draws of one piece of work: a function of the seed and the number of the piece alone, so that a filter that is
 /// restored goes on as it would have.
-fn draws(seed: u64, number: u64) -> Xoshiro128PlusPlus {
+pub(crate) fn draws(seed: u64, number: u64) -> Xoshiro128PlusPlus {
     Xoshiro128PlusPlus::seed_from_u64(seed.wrapping_add(number.wrapping_mul(0x9E37_79B9_7F4A_7C15)))
 }
 

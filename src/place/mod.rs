@@ -32,13 +32,13 @@
 //! ```
 
 mod config;
-mod obstacles;
+pub(crate) mod scan;
 
 pub use config::{PlaceConfig, PlaceConfigError};
 
 use crate::ring::{Echo, RingFrame, RingGeometry};
 use crate::{FaultCounters, FaultKind, Fingerprint};
-use obstacles::{DEAD, Meeting, SILENT};
+use scan::{DEAD, Meeting, SILENT, Scan};
 
 /// How many frames the radius is averaged over.
 const KEPT: usize = 8;
@@ -76,12 +76,14 @@ impl Sighting {
 /// Turns the frames of a ring of `SONARS` sensors into places.
 ///
 /// The ranges are taken from the robot's centre; add the radius of the ring if the sensors measure from its rim.
-/// Memory: about `6 · SONARS + 160` bytes. Time for each frame: `O(SONARS)`, at most six passes over the ring.
+/// Memory: about `8 · SONARS + 160` bytes. Time for each frame: `O(SONARS)`, at most six passes over the ring.
 #[derive(Clone, Debug)]
 pub struct PlaceDetector<const SONARS: usize> {
     config: PlaceConfig,
     geometry: RingGeometry<SONARS>,
     started: bool,
+    /// The newest frame, smoothed.
+    smooth_mm: [u16; SONARS],
     /// The last two frames, as smoothing reads them.
     earlier_mm: [[u16; SONARS]; 2],
     frame_index: u32,
@@ -103,6 +105,7 @@ impl<const SONARS: usize> PlaceDetector<SONARS> {
             config: PlaceConfig::UNSET,
             geometry: RingGeometry { bearings_mrad: [0; SONARS] },
             started: false,
+            smooth_mm: [DEAD; SONARS],
             earlier_mm: [[DEAD; SONARS]; 2],
             frame_index: 0,
             leaving: false,
@@ -127,6 +130,7 @@ impl<const SONARS: usize> PlaceDetector<SONARS> {
         self.config = config;
         self.geometry = geometry;
         self.started = true;
+        self.smooth_mm = [DEAD; SONARS];
         self.earlier_mm = [[DEAD; SONARS]; 2];
         self.frame_index = 0;
         self.leaving = false;
@@ -145,15 +149,37 @@ impl<const SONARS: usize> PlaceDetector<SONARS> {
         }
         let frame_index = self.frame_index;
         self.frame_index = self.frame_index.saturating_add(1);
-        let ranges_mm = self.smooth(frame);
-        let live = ranges_mm.iter().filter(|range_mm| **range_mm != DEAD).count();
+        self.smooth_mm = self.smooth(frame);
+        let live = self.smooth_mm.iter().filter(|range_mm| **range_mm != DEAD).count();
         if live < usize::from(self.config.live_sensors_min) {
             self.faults.count(FaultKind::RingBlind);
             return None;
         }
-        let meeting =
-            obstacles::meeting(&ranges_mm, &self.geometry, self.config.separation_mrad, self.config.equidistance_mm);
+        let meeting = self.scan().meeting();
         if self.leaving { self.leave(meeting) } else { self.look(Sighting { meeting, frame_index }) }
+    }
+
+    /// What the ring hears, smoothed.
+    pub(crate) fn scan(&self) -> Scan<'_, SONARS> {
+        Scan {
+            ranges_mm: &self.smooth_mm,
+            geometry: &self.geometry,
+            separation_mrad: self.config.separation_mrad,
+            equidistance_mm: self.config.equidistance_mm,
+        }
+    }
+
+    /// Whether the robot is still at the place that was reported last.
+    pub const fn is_leaving(&self) -> bool {
+        self.leaving
+    }
+
+    /// The robot has not moved from the place that was reported last: what the ring hears while it turns on the spot does not
+    /// mean that it leaves.
+    pub const fn stay(&mut self) {
+        if self.leaving {
+            self.against = 0;
+        }
     }
 
     /// The faults seen since the start: blind frames, nonsense ranges, radii that no fingerprint holds.

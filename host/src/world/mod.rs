@@ -21,12 +21,14 @@
 
 mod journal;
 mod plan;
+mod rover;
 mod sight;
 mod simulation;
 mod voronoi;
 
 pub use journal::{Detection, Journal, Report};
 pub use plan::{Plan, PlanError};
+pub use rover::{BodyModel, Rover};
 pub use sight::{SONARS, SonarModel, even_ring};
 pub use simulation::{Pose, RobotModel, Simulation, Truth};
 pub use voronoi::{TrueEdge, TrueMap, TrueNode, VoronoiError};

@@ -80,6 +80,12 @@ impl<const N: usize, const V: usize, const HISTORY: usize> RobustFilter<N, V, HI
         self.names.path().iter().copied().take(self.record.len())
     }
 
+    /// The vertex of a place on that path, so many places ago, 0 for the newest.
+    pub fn recent(&self, ago: usize) -> Option<u8> {
+        let index = self.record.len().checked_sub(ago)?.checked_sub(1)?;
+        self.names.path().get(index).copied()
+    }
+
     /// The probability that the robot is at a vertex of the best map, given that map, in units of 2⁻¹⁶.
     pub fn place_probability_q16(&self, vertex: u8) -> u32 {
         self.belief_q16.get(usize::from(vertex)).copied().unwrap_or(0)

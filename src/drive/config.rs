@@ -1,0 +1,95 @@
+//! The drive's settings: documented defaults, checked once.
+
+use core::fmt;
+
+/// How the robot keeps to the Voronoi graph.
+///
+/// The defaults suit a robot that drives some 30 mm between two ring frames.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct DriveConfig {
+    /// Full speed along an edge, in thousandths of what the wheels can, 1 to 1000. Default 1000.
+    pub speed_permille: u16,
+    /// The pilot steers for the point of the edge that is this far ahead, in millimetres, at least 1. Default 400. Shorter
+    /// follows bends and noise more closely.
+    pub look_ahead_mm: u16,
+    /// A meet point has been reached when it is this near, in millimetres. Default 40.
+    pub arrive_mm: u16,
+    /// The robot backs away from anything straight ahead that is this near, in millimetres. Default 250.
+    pub clearance_mm: u16,
+    /// The pilot gives up what it is at, and looks for the graph anew, after so many ring frames without success, at
+    /// least 1. Default 100.
+    pub patience_frames: u16,
+}
+
+impl DriveConfig {
+    /// The documented defaults.
+    pub const DEFAULT: Self =
+        Self { speed_permille: 1000, look_ahead_mm: 400, arrive_mm: 40, clearance_mm: 250, patience_frames: 100 };
+
+    pub(super) const UNSET: Self =
+        Self { speed_permille: 0, look_ahead_mm: 0, arrive_mm: 0, clearance_mm: 0, patience_frames: 0 };
+
+    /// Whether every field is in its range.
+    pub(super) const fn check(&self) -> Result<(), DriveConfigError> {
+        if self.speed_permille == 0 || self.speed_permille > 1000 {
+            return Err(DriveConfigError::SpeedPermille);
+        }
+        if self.look_ahead_mm == 0 {
+            return Err(DriveConfigError::LookAheadMm);
+        }
+        if self.patience_frames == 0 {
+            return Err(DriveConfigError::PatienceFrames);
+        }
+        Ok(())
+    }
+}
+
+impl Default for DriveConfig {
+    fn default() -> Self {
+        Self::DEFAULT
+    }
+}
+
+/// Which field of a [`DriveConfig`] cannot be.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum DriveConfigError {
+    /// `speed_permille`: 0, or above 1000.
+    SpeedPermille,
+    /// `look_ahead_mm`: 0.
+    LookAheadMm,
+    /// `patience_frames`: 0.
+    PatienceFrames,
+}
+
+impl fmt::Display for DriveConfigError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::SpeedPermille => "speed_permille: must be from 1 to 1000",
+            Self::LookAheadMm => "look_ahead_mm: must not be 0",
+            Self::PatienceFrames => "patience_frames: must not be 0",
+        })
+    }
+}
+
+impl core::error::Error for DriveConfigError {}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_configuration_names_the_field_that_cannot_be() {
+        let good = DriveConfig::DEFAULT;
+        assert_eq!(good.check(), Ok(()));
+        let wrong = [
+            (DriveConfig { speed_permille: 0, ..good }, DriveConfigError::SpeedPermille),
+            (DriveConfig { speed_permille: 1001, ..good }, DriveConfigError::SpeedPermille),
+            (DriveConfig { look_ahead_mm: 0, ..good }, DriveConfigError::LookAheadMm),
+            (DriveConfig { patience_frames: 0, ..good }, DriveConfigError::PatienceFrames),
+        ];
+        for (config, error) in wrong {
+            assert_eq!(config.check(), Err(error));
+        }
+    }
+}

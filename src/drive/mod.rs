@@ -1,0 +1,136 @@
+//! The drive: ring frames in, a heading and a speed out, along the generalised Voronoi graph and from place to place.
+//!
+//! ```text
+//! PlaceDetector ─ smoothed ring ─▶ Pilot ─ Suggestion ─▶ wheels
+//! Filter ─ best map, belief ─▶ Navigator ─ which way ─▶ Pilot
+//!                                  ▲ turn hint, back to the filter
+//! ```
+//!
+//! The [`Pilot`](pilot) keeps the robot equidistant from the two closest obstacles, homes in on the point where a third is as
+//! close, stands there until the detector reports the place, and leaves by the way that the navigator names. It tells ways
+//! apart by their order in bearing, beginning with the one it came by; nothing is metric and there is no odometry. The
+//! navigator knows what it did at each place of the history; with the filter's best path that tells which way of a place leads to
+//! which vertex, and each revision of the path revises it all.
+
+mod config;
+mod departures;
+mod navigator;
+mod pilot;
+mod steering;
+mod wheels;
+
+pub use config::{DriveConfig, DriveConfigError};
+pub use navigator::{Goal, Journey};
+pub use pilot::PilotState;
+pub use wheels::{DifferentialDrive, MotorError, Wheel, WheelSpeeds, WheelsConfig, WheelsConfigError};
+
+use crate::place::{Place, PlaceDetector};
+use crate::{FaultCounters, Filter, Turn, Update};
+use navigator::Navigator;
+use pilot::Pilot;
+
+/// Where to go until the next ring frame.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Suggestion {
+    /// The direction to drive in, in milliradians, counter-clockwise from where the first bearing of the ring's geometry is 0.
+    pub heading_mrad: i16,
+    /// How fast, in thousandths of the robot's full speed; 0 to turn on the spot, or to stand when the heading is 0 as well.
+    pub speed_permille: u16,
+}
+
+impl Suggestion {
+    /// Stand still.
+    pub const STAND: Self = Self { heading_mrad: 0, speed_permille: 0 };
+}
+
+/// The drive of a robot whose maps have at most `V` vertices and whose filter remembers `HISTORY` places.
+///
+/// Const-constructed to zero. Memory: about `HISTORY + 160` bytes. Time for a ring frame: O(SONARS); at a place O(V · HISTORY).
+#[derive(Clone, Debug)]
+pub struct Drive<const V: usize, const HISTORY: usize> {
+    pilot: Pilot,
+    navigator: Navigator<V, HISTORY>,
+}
+
+impl<const V: usize, const HISTORY: usize> Drive<V, HISTORY> {
+    /// A drive that waits for [`Drive::start`].
+    pub const fn new() -> Self {
+        Self { pilot: Pilot::new(), navigator: Navigator::new() }
+    }
+
+    /// Forgets everything and starts anew: looks for the Voronoi graph, and explores. `seed` decides between equals.
+    ///
+    /// # Errors
+    /// Names the first setting that is out of its range; the drive is then as it was.
+    pub fn start(&mut self, config: DriveConfig, seed: u64) -> Result<(), DriveConfigError> {
+        config.check()?;
+        self.pilot.start(config);
+        self.navigator.start(seed);
+        Ok(())
+    }
+
+    /// Takes what the detector and the filter made of a ring frame, and says where to go.
+    ///
+    /// `seen` is what the mapper said of the frame.
+    pub fn advance<const SONARS: usize, F: Filter<V>>(
+        &mut self,
+        detector: &PlaceDetector<SONARS>,
+        filter: &F,
+        seen: Option<(&Place, &Update)>,
+    ) -> Suggestion {
+        if let Some((place, update)) = seen {
+            self.navigator.arrive(filter, update);
+            self.pilot.arrive(place.degree);
+        }
+        let navigator = &mut self.navigator;
+        self.pilot.advance(&detector.scan(), detector.is_leaving(), |ways| navigator.choose(filter, ways))
+    }
+
+    /// How the robot left the place before the one it may be at, if it knows: the hint for the filter.
+    pub const fn turn(&self) -> Option<Turn> {
+        self.pilot.turn()
+    }
+
+    /// Explore, go to a vertex, or stand at the next place.
+    pub fn set_goal(&mut self, goal: Goal) {
+        self.navigator.set_goal(goal);
+        self.pilot.reconsider();
+    }
+
+    /// What the drive is asked to do.
+    pub const fn goal(&self) -> Goal {
+        self.navigator.goal()
+    }
+
+    /// How the way to the last goal went.
+    pub const fn journey(&self) -> Journey {
+        self.navigator.journey()
+    }
+
+    /// What the pilot does.
+    pub const fn state(&self) -> PilotState {
+        self.pilot.state()
+    }
+
+    /// Whether the robot stands, or turns on the spot, at the place that was reported last: [`PlaceDetector::stay`] is for it.
+    pub const fn is_at_place(&self) -> bool {
+        matches!(self.pilot.state(), PilotState::Look | PilotState::Face | PilotState::Stand)
+    }
+
+    /// The robot was, or may have been, carried: what it did at the newest place led nowhere.
+    pub fn carried(&mut self) {
+        self.navigator.forget_departure();
+        self.pilot.lose_way();
+    }
+
+    /// How often the drive lost its way.
+    pub const fn faults(&self) -> &FaultCounters {
+        self.pilot.faults()
+    }
+}
+
+impl<const V: usize, const HISTORY: usize> Default for Drive<V, HISTORY> {
+    fn default() -> Self {
+        Self::new()
+    }
+}

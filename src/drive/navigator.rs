@@ -1,0 +1,188 @@
+//! Which way out of a place: exploring, or going to a vertex of the map.
+
+use rand_core::Rng;
+
+use super::departures::{Departures, WAYS, Way};
+use super::pilot::WaysOut;
+use crate::filter::draws;
+use crate::{Filter, Update};
+
+/// A robot is at a vertex when the filter believes so with at least this probability, in units of 2⁻¹⁶.
+const CONFIRMED_Q16: u32 = 1 << 15;
+
+/// What the drive is asked to do.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum Goal {
+    /// Leave every place by the way that was used least.
+    Explore,
+    /// Drive to this vertex of the best map and stand there.
+    Vertex(u8),
+    /// Stand at the next place.
+    Stand,
+}
+
+/// How the way to a vertex goes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum Journey {
+    /// None was asked for.
+    None,
+    /// The robot is on its way.
+    Underway,
+    /// The robot stands at the vertex: the filter believes so.
+    Arrived,
+    /// The vertex is not part of the best map any more.
+    VertexGone,
+    /// After many more places than the map has vertices the robot is not there.
+    TooLong,
+}
+
+/// Decides at places; remembers one byte for each of `HISTORY` places.
+#[derive(Clone, Debug)]
+pub(super) struct Navigator<const V: usize, const HISTORY: usize> {
+    seed: u64,
+    goal: Goal,
+    journey: Journey,
+    /// Places since the goal was set.
+    places: u16,
+    /// How many decisions were made.
+    decisions: u32,
+    departures: Departures<HISTORY>,
+}
+
+impl<const V: usize, const HISTORY: usize> Navigator<V, HISTORY> {
+    pub(super) const fn new() -> Self {
+        Self {
+            seed: 0,
+            goal: Goal::Explore,
+            journey: Journey::None,
+            places: 0,
+            decisions: 0,
+            departures: Departures::new(),
+        }
+    }
+
+    pub(super) fn start(&mut self, seed: u64) {
+        self.seed = seed;
+        self.goal = Goal::Explore;
+        self.journey = Journey::None;
+        self.places = 0;
+        self.decisions = 0;
+        self.departures.clear();
+    }
+
+    pub(super) fn set_goal(&mut self, goal: Goal) {
+        self.goal = goal;
+        self.places = 0;
+        self.journey = if matches!(goal, Goal::Vertex(_)) { Journey::Underway } else { Journey::None };
+    }
+
+    pub(super) const fn goal(&self) -> Goal {
+        self.goal
+    }
+
+    pub(super) const fn journey(&self) -> Journey {
+        self.journey
+    }
+
+    pub(super) fn forget_departure(&mut self) {
+        self.departures.forget();
+    }
+
+    /// The filter has taken in a place.
+    pub(super) fn arrive(&mut self, filter: &impl Filter<V>, _update: &Update) {
+        self.departures.arrive();
+        self.places = self.places.saturating_add(1);
+        if let (Goal::Vertex(target), Journey::Underway) = (self.goal, self.journey) {
+            match filter.renamed(target) {
+                Some(target) => self.goal = Goal::Vertex(target),
+                None => self.journey = Journey::VertexGone,
+            }
+        }
+    }
+
+    /// Chooses the way out of the place that the robot stands at; `None` to stay.
+    pub(super) fn choose(&mut self, filter: &impl Filter<V>, ways: WaysOut) -> Option<u8> {
+        let known = self.departures.ways(filter, if ways.came_by_first { ways.count } else { 0 });
+        self.decisions = self.decisions.wrapping_add(1);
+        let chosen = match self.goal {
+            Goal::Stand => None,
+            Goal::Explore => self.least_used(&known, ways.count),
+            Goal::Vertex(target) => {
+                self.look_around(filter, target);
+                if self.journey == Journey::Underway { self.towards(filter, target, &known, ways.count) } else { None }
+            }
+        };
+        if let Some(exit) = chosen {
+            self.departures.depart(ways, exit);
+        }
+        chosen
+    }
+
+    /// Whether the journey is over.
+    fn look_around(&mut self, filter: &impl Filter<V>, target: u8) {
+        if self.journey != Journey::Underway {
+            return;
+        }
+        let is_there = filter.recent(0) == Some(target) && filter.place_probability_q16(target) >= CONFIRMED_Q16;
+        if is_there {
+            self.journey = Journey::Arrived;
+        } else if target >= filter.map().vertices() {
+            self.journey = Journey::VertexGone;
+        } else if usize::from(self.places) > 8 * V {
+            self.journey = Journey::TooLong;
+        }
+    }
+
+    /// The way that was used least, at random among equals.
+    fn least_used(&self, known: &[Way; WAYS], count: u8) -> Option<u8> {
+        let least = known.iter().take(usize::from(count)).map(|way| way.uses).min()?;
+        self.at_random(known, count, |way| way.uses == least)
+    }
+
+    /// The way to the neighbour that is nearest to the target; if it is not known which way leads there, one of which it is not
+    /// known where it leads.
+    fn towards(&self, filter: &impl Filter<V>, target: u8, known: &[Way; WAYS], count: u8) -> Option<u8> {
+        let steps_to = steps_to(filter, target);
+        let steps = |vertex: u8| steps_to.get(usize::from(vertex)).copied().flatten();
+        let way_steps = |way: &Way| way.leads_to.and_then(steps);
+        let nearest = known.iter().take(usize::from(count)).filter_map(way_steps).min();
+        let here = filter.recent(0).and_then(steps);
+        match (nearest, here) {
+            (Some(nearest), Some(here)) if nearest < here => {
+                self.at_random(known, count, |way| way_steps(way) == Some(nearest))
+            }
+            _ => self
+                .at_random(known, count, |way| way.leads_to.is_none())
+                .or_else(|| self.at_random(known, count, |_| true)),
+        }
+    }
+
+    /// One of the ways that suit, each with the same probability.
+    fn at_random(&self, known: &[Way; WAYS], count: u8, suits: impl Fn(&Way) -> bool) -> Option<u8> {
+        let suitable = || (0..count).zip(known).filter(|(_, way)| suits(way)).map(|(number, _)| number);
+        let draw = draws(self.seed, u64::from(self.decisions)).next_u32() as usize;
+        suitable().nth(draw.checked_rem(suitable().count())?)
+    }
+}
+
+/// How many edges each vertex of the best map is away from another. Time O(V²) on rows of bits.
+fn steps_to<const V: usize>(filter: &impl Filter<V>, target: u8) -> [Option<u8>; V] {
+    let map = filter.map();
+    let mut steps_to = [None; V];
+    let mut reached: u64 = 0;
+    let mut newly: u64 = 1u64.checked_shl(u32::from(target)).unwrap_or(0);
+    for steps in 0..V as u8 {
+        let mut next = 0;
+        for (vertex, slot) in (0..map.vertices()).zip(&mut steps_to) {
+            if newly >> (vertex & 63) & 1 == 1 {
+                *slot = Some(steps);
+                next |= map.neighbours(vertex);
+            }
+        }
+        reached |= newly;
+        newly = next & !reached;
+    }
+    steps_to
+}

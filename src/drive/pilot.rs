@@ -1,0 +1,278 @@
+//! Driving from place to place: along an edge, up to the meet point, out by the way that was chosen.
+
+use super::steering::{Beside, along_edge, meet_point};
+use super::{DriveConfig, Suggestion};
+use crate::bearing::{HALF_TURN_MRAD, turn_mrad};
+use crate::place::scan::{SILENT, Scan, Ways};
+use crate::{FaultCounters, FaultKind, Turn};
+
+/// A way is the one that was meant when its bearing has moved by less since the last frame, in milliradians.
+const SAME_WAY_MRAD: i32 = 700;
+/// The robot faces a way that is this near to straight ahead, in milliradians.
+const FACING_MRAD: i32 = 200;
+/// So long the pilot waits at a place for a frame with as many ways as the detector counted.
+const LOOK_FRAMES: u16 = 12;
+/// On the last stretch to a meet point the speed falls to this, in thousandths.
+const CREEP_PERMILLE: u16 = 250;
+/// At this distance from a meet point the speed begins to fall, in millimetres.
+const BRAKE_MM: u16 = 400;
+
+/// What the pilot does.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[repr(u8)]
+#[non_exhaustive]
+pub enum PilotState {
+    /// It drives along an edge of the Voronoi graph, or looks for one.
+    Follow = 0,
+    /// It homes in on a meet point and waits for the detector to confirm it.
+    Home = 1,
+    /// It stands at a confirmed place and looks for the ways out.
+    Look = 2,
+    /// It turns to the way that was chosen.
+    Face = 3,
+    /// It leaves a place.
+    Leave = 4,
+    /// It stands at a place because there is nothing to do.
+    Stand = 5,
+    /// It turns away from an obstacle, or from nowhere, to where there is room.
+    Escape = 6,
+}
+
+/// The ways out of a place, numbered counter-clockwise from the one the robot came by.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct WaysOut {
+    /// How many there are, at least 1.
+    pub(super) count: u8,
+    /// Whether number 0 is known to be the way the robot came by.
+    pub(super) came_by_first: bool,
+}
+
+/// The pilot's state: some 40 bytes.
+#[derive(Clone, Debug)]
+pub(super) struct Pilot {
+    config: DriveConfig,
+    state: PilotState,
+    /// Ring frames in this state.
+    frames: u16,
+    /// Where the way lies by which the robot came, and the one by which it leaves.
+    back_mrad: i16,
+    target_mrad: i16,
+    /// What the detector counted at the place.
+    degree: Option<u8>,
+    turn: Option<Turn>,
+    faults: FaultCounters,
+}
+
+impl Pilot {
+    pub(super) const fn new() -> Self {
+        Self {
+            config: DriveConfig::UNSET,
+            state: PilotState::Follow,
+            frames: 0,
+            back_mrad: 0,
+            target_mrad: 0,
+            degree: None,
+            turn: None,
+            faults: FaultCounters::new(),
+        }
+    }
+
+    pub(super) fn start(&mut self, config: DriveConfig) {
+        *self = Self { config, ..Self::new() };
+    }
+
+    pub(super) const fn state(&self) -> PilotState {
+        self.state
+    }
+
+    pub(super) const fn turn(&self) -> Option<Turn> {
+        self.turn
+    }
+
+    pub(super) const fn faults(&self) -> &FaultCounters {
+        &self.faults
+    }
+
+    /// The detector has confirmed a place.
+    pub(super) fn arrive(&mut self, degree: Option<u8>) {
+        self.degree = degree;
+        self.turn = None;
+        self.enter(PilotState::Look);
+    }
+
+    /// The goal has changed: a robot that stands looks at the ways again.
+    pub(super) fn reconsider(&mut self) {
+        if self.state == PilotState::Stand {
+            self.enter(PilotState::Look);
+        }
+    }
+
+    /// What the pilot knew of its way holds no longer.
+    pub(super) fn lose_way(&mut self) {
+        self.turn = None;
+        self.enter(PilotState::Follow);
+    }
+
+    /// Takes the next frame. `leaving` says whether the detector takes the robot to be still at the place it reported last;
+    /// `choose` names the way out of a place, `None` to stay.
+    pub(super) fn advance<const SONARS: usize>(
+        &mut self,
+        scan: &Scan<'_, SONARS>,
+        leaving: bool,
+        choose: impl FnOnce(WaysOut) -> Option<u8>,
+    ) -> Suggestion {
+        self.frames = self.frames.saturating_add(1);
+        match self.state {
+            PilotState::Follow => self.follow(scan, leaving),
+            PilotState::Home => self.home(scan),
+            PilotState::Look => self.look(scan, choose),
+            PilotState::Face => self.face(scan),
+            PilotState::Leave => self.leave(scan, leaving),
+            PilotState::Escape => self.escape(scan),
+            PilotState::Stand => Suggestion::STAND,
+        }
+    }
+
+    fn enter(&mut self, state: PilotState) {
+        self.state = state;
+        self.frames = 0;
+    }
+
+    fn is_out_of_patience(&self) -> bool {
+        self.frames > self.config.patience_frames
+    }
+
+    /// Turns to where there is most room and starts over; how the robot left the last place says nothing any more.
+    fn give_up<const SONARS: usize>(&mut self, scan: &Scan<'_, SONARS>) -> Suggestion {
+        self.faults.count(FaultKind::DriveLost);
+        self.turn = None;
+        let most_room = scan.echoes().max_by_key(|(range_mm, _)| *range_mm);
+        self.target_mrad = most_room.map_or(0, |(_, bearing_mrad)| bearing_mrad);
+        self.enter(PilotState::Escape);
+        Suggestion { heading_mrad: self.target_mrad, speed_permille: 0 }
+    }
+
+    fn escape<const SONARS: usize>(&mut self, scan: &Scan<'_, SONARS>) -> Suggestion {
+        // Without odometry the robot knows that it has turned by what it hears ahead.
+        let ahead = scan.nearest(|bearing_mrad| i32::from(bearing_mrad).abs() < FACING_MRAD);
+        let is_free = ahead.is_none_or(|ahead| ahead.range_mm > self.config.clearance_mm.saturating_mul(2));
+        if is_free && self.frames > 5 || self.is_out_of_patience() {
+            self.enter(PilotState::Follow);
+        }
+        Suggestion { heading_mrad: if self.target_mrad < 0 { -1571 } else { 1571 }, speed_permille: 0 }
+    }
+
+    fn follow<const SONARS: usize>(&mut self, scan: &Scan<'_, SONARS>, leaving: bool) -> Suggestion {
+        let closest = scan.closest();
+        if !leaving && closest.spread_mm() <= scan.equidistance_mm {
+            self.back_mrad = HALF_TURN_MRAD;
+            self.enter(PilotState::Home);
+            return self.home(scan);
+        }
+        self.drive(scan, Beside::EDGE, closest.spread_mm())
+    }
+
+    fn drive<const SONARS: usize>(&mut self, scan: &Scan<'_, SONARS>, beside: Beside, spread_mm: u16) -> Suggestion {
+        let ahead = scan.nearest(|bearing_mrad| i32::from(bearing_mrad).abs() < i32::from(FACING_MRAD as i16));
+        if ahead.is_some_and(|ahead| ahead.range_mm < self.config.clearance_mm) {
+            return self.give_up(scan);
+        }
+        let heading_mrad = along_edge(scan, beside, self.config.look_ahead_mm).unwrap_or(0);
+        Suggestion { heading_mrad, speed_permille: self.slowed(spread_mm) }
+    }
+
+    /// The speed so far from a meet point.
+    fn slowed(&self, way_mm: u16) -> u16 {
+        let full = self.config.speed_permille;
+        let creep = CREEP_PERMILLE.min(full);
+        let share = u32::from(way_mm.min(BRAKE_MM)) * u32::from(full) / u32::from(BRAKE_MM);
+        (share as u16).max(creep)
+    }
+
+    fn home<const SONARS: usize>(&mut self, scan: &Scan<'_, SONARS>) -> Suggestion {
+        let closest = scan.closest();
+        if self.is_out_of_patience() {
+            return self.give_up(scan);
+        }
+        if closest.spread_mm() > scan.equidistance_mm.saturating_mul(2) && closest.spread_mm() != SILENT {
+            self.enter(PilotState::Follow);
+            return self.follow(scan, false);
+        }
+        self.track_back(&scan.ways(&closest));
+        match meet_point(&closest) {
+            Some(way) if way.length() > i32::from(self.config.arrive_mm) => {
+                let heading_mrad = way.bearing_mrad();
+                // What lies behind has been passed, and turning round for it would cost the bearing of the way back.
+                if i32::from(heading_mrad).abs() > 1571 {
+                    return Suggestion::STAND;
+                }
+                let way_mm = way.length().clamp(0, i32::from(BRAKE_MM)) as u16;
+                Suggestion { heading_mrad, speed_permille: self.slowed(way_mm) }
+            }
+            _ => Suggestion::STAND,
+        }
+    }
+
+    /// Keeps the bearing of the way back up to date while the robot turns a little.
+    fn track_back(&mut self, ways: &Ways) {
+        if let Some((_, back_mrad)) = ways.nearest(self.back_mrad, SAME_WAY_MRAD) {
+            self.back_mrad = back_mrad;
+        }
+    }
+
+    fn look<const SONARS: usize>(
+        &mut self,
+        scan: &Scan<'_, SONARS>,
+        choose: impl FnOnce(WaysOut) -> Option<u8>,
+    ) -> Suggestion {
+        let ways = scan.ways(&scan.closest());
+        self.track_back(&ways);
+        let bearings_mrad = ways.bearings_mrad();
+        let count = bearings_mrad.len();
+        let agrees = self.degree.is_none_or(|degree| usize::from(degree) == count);
+        if count == 0 && self.frames > LOOK_FRAMES {
+            return self.give_up(scan);
+        }
+        if count == 0 || !agrees && self.frames <= LOOK_FRAMES {
+            return Suggestion::STAND;
+        }
+        let back = ways.nearest(self.back_mrad, SAME_WAY_MRAD).map(|(index, _)| index);
+        let Some(chosen) = choose(WaysOut { count: count as u8, came_by_first: back.is_some() }) else {
+            self.enter(PilotState::Stand);
+            return Suggestion::STAND;
+        };
+        self.turn = back.map(|_| if chosen == 0 { Turn::Back } else { Turn::On });
+        let index = (back.unwrap_or(0) + usize::from(chosen)).checked_rem(count).unwrap_or(0);
+        self.target_mrad = bearings_mrad.get(index).copied().unwrap_or(0);
+        self.enter(PilotState::Face);
+        self.face(scan)
+    }
+
+    fn face<const SONARS: usize>(&mut self, scan: &Scan<'_, SONARS>) -> Suggestion {
+        if self.is_out_of_patience() {
+            return self.give_up(scan);
+        }
+        if let Some((_, target_mrad)) = scan.ways(&scan.closest()).nearest(self.target_mrad, SAME_WAY_MRAD) {
+            // Straight behind, noise must not change the sense of turning.
+            let is_behind = turn_mrad(HALF_TURN_MRAD, target_mrad).abs() < SAME_WAY_MRAD;
+            let turns_over = (target_mrad < 0) != (self.target_mrad < 0);
+            self.target_mrad = if is_behind && turns_over { self.target_mrad } else { target_mrad };
+        }
+        if i32::from(self.target_mrad).abs() <= FACING_MRAD {
+            self.enter(PilotState::Leave);
+            return self.drive(scan, Beside::WAY_OUT, SILENT);
+        }
+        Suggestion { heading_mrad: self.target_mrad, speed_permille: 0 }
+    }
+
+    fn leave<const SONARS: usize>(&mut self, scan: &Scan<'_, SONARS>, leaving: bool) -> Suggestion {
+        if self.is_out_of_patience() {
+            return self.give_up(scan);
+        }
+        if !leaving {
+            self.enter(PilotState::Follow);
+            return self.follow(scan, leaving);
+        }
+        self.drive(scan, Beside::WAY_OUT, SILENT)
+    }
+}

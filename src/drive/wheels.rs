@@ -1,0 +1,231 @@
+//! Two driven wheels: a suggestion becomes wheel speeds, and wheel speeds become PWM duty and direction.
+
+use core::fmt;
+
+use embedded_hal::{digital::OutputPin, pwm::SetDutyCycle};
+
+use super::Suggestion;
+
+/// How a robot with two driven wheels turns a suggestion into wheel speeds.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct WheelsConfig {
+    /// Beyond this heading the robot turns on the spot, in milliradians, 1 to 3142. Default 600.
+    pub spin_from_mrad: i16,
+    /// Speed of each wheel while it turns on the spot, in thousandths, 1 to 1000. Default 500.
+    pub spin_permille: u16,
+    /// By how much each wheel is faster or slower for a heading of one radian, in thousandths, 1 to 2000. Default 800.
+    pub steer_permille_per_rad: u16,
+    /// The least duty at which the motors move at all, in thousandths, below 1000. Default 0.
+    pub dead_zone_permille: u16,
+}
+
+impl WheelsConfig {
+    /// The documented defaults.
+    pub const DEFAULT: Self =
+        Self { spin_from_mrad: 600, spin_permille: 500, steer_permille_per_rad: 800, dead_zone_permille: 0 };
+
+    /// Whether every field is in its range.
+    ///
+    /// # Errors
+    /// The first field that is not.
+    pub const fn check(&self) -> Result<(), WheelsConfigError> {
+        if self.spin_from_mrad < 1 || self.spin_from_mrad > 3142 {
+            return Err(WheelsConfigError::SpinFromMrad);
+        }
+        if self.spin_permille == 0 || self.spin_permille > 1000 {
+            return Err(WheelsConfigError::SpinPermille);
+        }
+        if self.steer_permille_per_rad == 0 || self.steer_permille_per_rad > 2000 {
+            return Err(WheelsConfigError::SteerPermillePerRad);
+        }
+        if self.dead_zone_permille >= 1000 {
+            return Err(WheelsConfigError::DeadZonePermille);
+        }
+        Ok(())
+    }
+}
+
+impl Default for WheelsConfig {
+    fn default() -> Self {
+        Self::DEFAULT
+    }
+}
+
+/// Which field of a [`WheelsConfig`] cannot be.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum WheelsConfigError {
+    /// `spin_from_mrad`: outside 1 to 3142.
+    SpinFromMrad,
+    /// `spin_permille`: outside 1 to 1000.
+    SpinPermille,
+    /// `steer_permille_per_rad`: outside 1 to 2000.
+    SteerPermillePerRad,
+    /// `dead_zone_permille`: 1000 or more.
+    DeadZonePermille,
+}
+
+impl fmt::Display for WheelsConfigError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::SpinFromMrad => "spin_from_mrad: must be from 1 to 3142",
+            Self::SpinPermille => "spin_permille: must be from 1 to 1000",
+            Self::SteerPermillePerRad => "steer_permille_per_rad: must be from 1 to 2000",
+            Self::DeadZonePermille => "dead_zone_permille: must be below 1000",
+        })
+    }
+}
+
+impl core::error::Error for WheelsConfigError {}
+
+/// The speeds of the two wheels, in thousandths of full speed, −1000 to 1000, forward positive.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct WheelSpeeds {
+    /// The left wheel.
+    pub left_permille: i16,
+    /// The right wheel.
+    pub right_permille: i16,
+}
+
+impl WheelSpeeds {
+    /// The wheel speeds that follow a suggestion.
+    pub fn of(suggestion: Suggestion, config: &WheelsConfig) -> Self {
+        let heading_mrad = i32::from(suggestion.heading_mrad);
+        let is_on_the_spot = suggestion.speed_permille == 0 || heading_mrad.abs() > i32::from(config.spin_from_mrad);
+        let steer = heading_mrad * i32::from(config.steer_permille_per_rad) / 1000;
+        let (forward, aside) = if is_on_the_spot {
+            let spin = i32::from(config.spin_permille);
+            (0, steer.clamp(-spin, spin))
+        } else {
+            let aside = steer.clamp(-1000, 1000);
+            // The faster wheel goes no faster than it can.
+            (i32::from(suggestion.speed_permille).min(1000 - aside.abs()), aside)
+        };
+        Self { left_permille: (forward - aside) as i16, right_permille: (forward + aside) as i16 }
+    }
+}
+
+/// Two motors, each with a PWM channel for its speed and a pin for its direction: high is forward.
+#[derive(Debug)]
+pub struct DifferentialDrive<PWM, DIRECTION> {
+    left: (PWM, DIRECTION),
+    right: (PWM, DIRECTION),
+    config: WheelsConfig,
+}
+
+impl<PWM: SetDutyCycle, DIRECTION: OutputPin> DifferentialDrive<PWM, DIRECTION> {
+    /// The two motors. Nothing moves before the first suggestion.
+    ///
+    /// # Errors
+    /// Names the field of the configuration that cannot be.
+    pub fn new(
+        left: (PWM, DIRECTION),
+        right: (PWM, DIRECTION),
+        config: WheelsConfig,
+    ) -> Result<Self, WheelsConfigError> {
+        config.check()?;
+        Ok(Self { left, right, config })
+    }
+
+    /// Sets both motors to follow a suggestion.
+    ///
+    /// # Errors
+    /// [`MotorError`] names the wheel that did not take its setting; the other one is set all the same.
+    pub fn follow(&mut self, suggestion: Suggestion) -> Result<(), MotorError> {
+        let WheelSpeeds { left_permille, right_permille } = WheelSpeeds::of(suggestion, &self.config);
+        let dead_zone_permille = self.config.dead_zone_permille;
+        let left = set(&mut self.left, left_permille, dead_zone_permille).map_err(|()| MotorError(Wheel::Left));
+        let right = set(&mut self.right, right_permille, dead_zone_permille).map_err(|()| MotorError(Wheel::Right));
+        left.and(right)
+    }
+
+    /// Stops both motors.
+    ///
+    /// # Errors
+    /// As [`DifferentialDrive::follow`].
+    pub fn stop(&mut self) -> Result<(), MotorError> {
+        self.follow(Suggestion::STAND)
+    }
+
+    /// Gives the motors back.
+    pub fn release(self) -> [(PWM, DIRECTION); 2] {
+        [self.left, self.right]
+    }
+}
+
+fn set<PWM: SetDutyCycle, DIRECTION: OutputPin>(
+    (pwm, direction): &mut (PWM, DIRECTION),
+    speed_permille: i16,
+    dead_zone_permille: u16,
+) -> Result<(), ()> {
+    let size = speed_permille.unsigned_abs().min(1000);
+    let duty_permille = match size {
+        0 => 0,
+        _ => u32::from(dead_zone_permille) + u32::from(size) * u32::from(1000 - dead_zone_permille.min(1000)) / 1000,
+    };
+    let turned = if speed_permille < 0 { direction.set_low() } else { direction.set_high() };
+    let duty = u32::from(pwm.max_duty_cycle()) * duty_permille.min(1000) / 1000;
+    pwm.set_duty_cycle(duty as u16).map_err(|_| ())?;
+    turned.map_err(|_| ())
+}
+
+/// One of the two wheels.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Wheel {
+    /// The left one.
+    Left,
+    /// The right one.
+    Right,
+}
+
+/// The motor of a wheel did not take its setting.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct MotorError(pub Wheel);
+
+impl fmt::Display for MotorError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self.0 {
+            Wheel::Left => "the left motor did not take its setting",
+            Wheel::Right => "the right motor did not take its setting",
+        })
+    }
+}
+
+impl core::error::Error for MotorError {}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn speeds(heading_mrad: i16, speed_permille: u16) -> (i16, i16) {
+        let suggestion = Suggestion { heading_mrad, speed_permille };
+        let WheelSpeeds { left_permille, right_permille } = WheelSpeeds::of(suggestion, &WheelsConfig::DEFAULT);
+        (left_permille, right_permille)
+    }
+
+    #[test]
+    fn ahead_is_both_wheels_alike_and_aside_is_an_arc_within_what_the_wheels_can() {
+        assert_eq!(speeds(0, 1000), (1000, 1000));
+        assert_eq!(speeds(0, 300), (300, 300));
+        assert_eq!(speeds(250, 500), (300, 700));
+        assert_eq!(speeds(-250, 1000), (1000, 600));
+    }
+
+    #[test]
+    fn far_aside_or_without_speed_the_robot_turns_on_the_spot() {
+        assert_eq!(speeds(2000, 1000), (-500, 500));
+        assert_eq!(speeds(-2000, 0), (500, -500));
+        assert_eq!(speeds(100, 0), (-80, 80));
+        assert_eq!(speeds(0, 0), (0, 0));
+    }
+
+    #[test]
+    fn every_suggestion_gives_speeds_that_the_wheels_can() {
+        for heading_mrad in (i16::MIN..=i16::MAX).step_by(97) {
+            for speed_permille in [0, 1, 500, 1000, u16::MAX] {
+                let (left, right) = speeds(heading_mrad, speed_permille);
+                assert!(left.abs() <= 1000 && right.abs() <= 1000, "{heading_mrad} {speed_permille}: {left} {right}");
+            }
+        }
+    }
+}
