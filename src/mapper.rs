@@ -33,12 +33,14 @@ pub struct Mapper<const SONARS: usize, const V: usize, F> {
     detector: PlaceDetector<SONARS>,
     filter: F,
     reporter: Reporter<V>,
+    /// The next place does not follow on the last one.
+    begins: bool,
 }
 
 impl<const SONARS: usize, const V: usize, F: Filter<V>> Mapper<SONARS, V, F> {
     /// A mapper that waits for [`Mapper::start`].
     pub const fn new() -> Self {
-        Self { detector: PlaceDetector::new(), filter: F::UNSTARTED, reporter: Reporter::new() }
+        Self { detector: PlaceDetector::new(), filter: F::UNSTARTED, reporter: Reporter::new(), begins: false }
     }
 
     /// Forgets everything and starts anew.
@@ -48,6 +50,7 @@ impl<const SONARS: usize, const V: usize, F: Filter<V>> Mapper<SONARS, V, F> {
     pub fn start(&mut self, config: &MapperConfig<SONARS, F::Config>) -> Result<(), MapperError> {
         self.detector.start(config.place, config.geometry).map_err(MapperError::Place)?;
         self.filter.start(config.filter, config.seed).map_err(MapperError::Filter)?;
+        self.begins = false;
         let capacities = Capacities::new(V as u8, F::capacities(&config.filter), SONARS as u8);
         self.reporter.start(Hello::new(config.boot, config.seed, capacities), FRAMES_PER_HELLO);
         Ok(())
@@ -68,7 +71,8 @@ impl<const SONARS: usize, const V: usize, F: Filter<V>> Mapper<SONARS, V, F> {
     ) -> Option<(Place, Update)> {
         let seen = self.detector.observe(frame).map(|place| {
             let Place { fingerprint, degree, .. } = place;
-            let update = self.filter.observe(Observation { turn, degree, ..Observation::new(fingerprint) });
+            let begins = core::mem::take(&mut self.begins);
+            let update = self.filter.observe(Observation { turn, degree, begins, ..Observation::new(fingerprint) });
             // A place is no state: one that the queue refuses is missing in the listener's log, and in nothing else.
             let _ = send(&Message::Place {
                 place_index: update.place_index,
@@ -87,6 +91,11 @@ impl<const SONARS: usize, const V: usize, F: Filter<V>> Mapper<SONARS, V, F> {
         faults.add(self.filter.faults());
         self.reporter.tick(self.filter.map(), &faults, &mut send);
         seen
+    }
+
+    /// The robot was carried, or its drive has lost its way: the next place need not be a neighbour of the last one.
+    pub fn carried(&mut self) {
+        self.begins = true;
     }
 
     /// The robot has not moved from the place that was reported last; see [`PlaceDetector::stay`].

@@ -112,9 +112,9 @@ impl<const V: usize, const HISTORY: usize> Drive<V, HISTORY> {
         self.pilot.state()
     }
 
-    /// Whether the robot stands, or turns on the spot, at the place that was reported last: [`PlaceDetector::stay`] is for it.
+    /// Whether the robot has not left the place that was reported last: [`PlaceDetector::stay`] is for it.
     pub const fn is_at_place(&self) -> bool {
-        matches!(self.pilot.state(), PilotState::Look | PilotState::Face | PilotState::Stand)
+        self.pilot.is_at_place()
     }
 
     /// The robot was, or may have been, carried: what it did at the newest place led nowhere.

@@ -12,6 +12,12 @@ const SAME_WAY_MRAD: i32 = 700;
 const FACING_MRAD: i32 = 200;
 /// So long the pilot waits at a place for a frame with as many ways as the detector counted.
 const LOOK_FRAMES: u16 = 12;
+/// So long after it set off the robot is still at the place: what the ring hears while an obstacle hides for a moment must not
+/// pass for another place.
+const SET_OFF_FRAMES: u16 = 8;
+/// The pilot bends no more sharply along an edge, in milliradians: an edge has no kink, and an echo that comes and goes would
+/// turn the robot round.
+const BEND_MRAD: i16 = 500;
 /// On the last stretch to a meet point the speed falls to this, in thousandths.
 const CREEP_PERMILLE: u16 = 250;
 /// At this distance from a meet point the speed begins to fall, in millimetres.
@@ -83,6 +89,15 @@ impl Pilot {
 
     pub(super) const fn state(&self) -> PilotState {
         self.state
+    }
+
+    /// Whether the robot has not left the place that was reported last.
+    pub(super) const fn is_at_place(&self) -> bool {
+        match self.state {
+            PilotState::Look | PilotState::Face | PilotState::Stand => true,
+            PilotState::Leave => self.frames < SET_OFF_FRAMES,
+            PilotState::Follow | PilotState::Home | PilotState::Escape => false,
+        }
     }
 
     pub(super) const fn turn(&self) -> Option<Turn> {
@@ -178,6 +193,7 @@ impl Pilot {
             return self.give_up(scan);
         }
         let heading_mrad = along_edge(scan, beside, self.config.look_ahead_mm).unwrap_or(0);
+        let heading_mrad = heading_mrad.clamp(-BEND_MRAD, BEND_MRAD);
         Suggestion { heading_mrad, speed_permille: self.slowed(spread_mm) }
     }
 
