@@ -133,8 +133,8 @@ impl<const SONARS: usize> Scan<'_, SONARS> {
         closest
     }
 
-    /// The ways that lead on between equidistant obstacles, counter-clockwise: the middle of each gap in which a sensor looks
-    /// so much farther than the radius that it cannot be a corner.
+    /// The ways that lead on between equidistant obstacles, counter-clockwise: in each gap the middle of the sensors that look
+    /// so much farther than the radius that they cannot hear a corner.
     pub(crate) fn ways(&self, closest: &Closest) -> Ways {
         let mut ways = Ways { bearings_mrad: [0; OBSTACLES], len: 0 };
         let radius_mm = closest.radius_mm();
@@ -145,12 +145,16 @@ impl<const SONARS: usize> Scan<'_, SONARS> {
                 (gap_mrad > 0).then_some(gap_mrad)
             });
             let gap_mrad = gap_mrad.min().unwrap_or(2 * i32::from(HALF_TURN_MRAD));
-            let leads_on = self.echoes().any(|(range_mm, bearing_mrad)| {
+            let open = self.echoes().filter_map(|(range_mm, bearing_mrad)| {
                 let within_mrad = counter_clockwise_mrad(from_mrad, bearing_mrad);
-                range_mm != DEAD && within_mrad > 0 && within_mrad < gap_mrad && is_beyond(range_mm, radius_mm)
+                let is_within = within_mrad > 0 && within_mrad < gap_mrad;
+                (range_mm != DEAD && is_within && is_beyond(range_mm, radius_mm)).then_some(within_mrad)
             });
-            if leads_on && let Some(slot) = ways.bearings_mrad.get_mut(ways.len) {
-                *slot = turned(from_mrad, gap_mrad / 2);
+            let (count, sum_mrad) =
+                open.fold((0i32, 0i32), |(count, sum), within_mrad| (count + 1, sum.saturating_add(within_mrad)));
+            if let (Some(middle_mrad), Some(slot)) = (sum_mrad.checked_div(count), ways.bearings_mrad.get_mut(ways.len))
+            {
+                *slot = turned(from_mrad, middle_mrad);
                 ways.len += 1;
             }
         }
