@@ -9,6 +9,9 @@ use core::fmt;
 /// How often the robot introduces itself, in ring frames.
 const FRAMES_PER_HELLO: u16 = 100;
 
+/// How many slices of polishing are made between two places at most: more seldom find anything, and a robot may stand for days.
+const SLICES_PER_PLACE: u16 = 64;
+
 /// The settings of every stage; `C` are those of the filter.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct MapperConfig<const SONARS: usize, C> {
@@ -35,12 +38,14 @@ pub struct Mapper<const SONARS: usize, const V: usize, F> {
     reporter: Reporter<V>,
     /// The next place does not follow on the last one.
     begins: bool,
+    /// Slices of polishing since the last place.
+    slices: u16,
 }
 
 impl<const SONARS: usize, const V: usize, F: Filter<V>> Mapper<SONARS, V, F> {
     /// A mapper that waits for [`Mapper::start`].
     pub const fn new() -> Self {
-        Self { detector: PlaceDetector::new(), filter: F::UNSTARTED, reporter: Reporter::new(), begins: false }
+        Self { detector: PlaceDetector::new(), filter: F::UNSTARTED, reporter: Reporter::new(), begins: false, slices: 0 }
     }
 
     /// Forgets everything and starts anew.
@@ -51,13 +56,14 @@ impl<const SONARS: usize, const V: usize, F: Filter<V>> Mapper<SONARS, V, F> {
         self.detector.start(config.place, config.geometry).map_err(MapperError::Place)?;
         self.filter.start(config.filter, config.seed).map_err(MapperError::Filter)?;
         self.begins = false;
+        self.slices = 0;
         let capacities = Capacities::new(V as u8, F::capacities(&config.filter), SONARS as u8);
         self.reporter.start(Hello::new(config.boot, config.seed, capacities), FRAMES_PER_HELLO);
         Ok(())
     }
 
     /// Takes one frame of the ring; gives the place and the update when the robot has just been at one. The filter uses
-    /// every other frame to polish its map.
+    /// up to 64 of the frames in between to polish its map.
     ///
     /// `turn` is what the drive knows of how the robot left the place before the one it may be at, `None` if nothing.
     /// `sonar_faults` are those of the ring's driver so far. Every message goes to `send`, which says whether the transmit
@@ -83,7 +89,10 @@ impl<const SONARS: usize, const V: usize, F: Filter<V>> Mapper<SONARS, V, F> {
             self.reporter.update(&self.filter, &update, &mut send);
             (place, update)
         });
-        if seen.is_none() {
+        if seen.is_some() {
+            self.slices = 0;
+        } else if self.slices < SLICES_PER_PLACE {
+            self.slices += 1;
             self.filter.polish();
         }
         let mut faults = *sonar_faults;
