@@ -25,11 +25,23 @@ pub enum FaultKind {
     WireFull = 8,
     /// A frame on the serial line was corrupt, cut or foreign.
     WireCorrupt = 9,
+    /// The flash could not be written or erased: a snapshot was not kept.
+    StoreFailed = 10,
+    /// A snapshot could not be restored: it was corrupt, of another version, or contradicts itself.
+    SnapshotRejected = 11,
+    /// A request was understood and refused.
+    CommandRefused = 12,
+    /// Requests came faster than the loop takes them: one was dropped.
+    CommandFlood = 13,
+    /// The drive lost its way along the Voronoi graph and looked for it anew.
+    DriveLost = 14,
+    /// A turn of the main loop took longer than its bound.
+    LoopLate = 15,
 }
 
 impl FaultKind {
     /// Every kind, in the order of its number.
-    pub const ALL: [Self; 10] = [
+    pub const ALL: [Self; 16] = [
         Self::SonarSilent,
         Self::SonarNonsense,
         Self::BusError,
@@ -40,6 +52,12 @@ impl FaultKind {
         Self::HistoryFull,
         Self::WireFull,
         Self::WireCorrupt,
+        Self::StoreFailed,
+        Self::SnapshotRejected,
+        Self::CommandRefused,
+        Self::CommandFlood,
+        Self::DriveLost,
+        Self::LoopLate,
     ];
 }
 

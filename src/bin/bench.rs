@@ -25,7 +25,7 @@ use toposlam::{
     Filter as _, Fingerprint, Observation, RobustConfig, RobustFilter, Turn, Update,
     reference::{self, Detector, Filter, HISTORY, PaperReference, RobotMapper, SONARS, VERTICES},
     ring::{Echo, RingFrame},
-    wire::{Capacities, Encoder, Hello, MAX_FRAME_BYTES, QueueFull, Reporter},
+    wire::{Capacities, Encoder, Hello, MAX_FRAME_BYTES, QueueFull, Reporter, ResetCause},
 };
 
 /// Radii in millimetres, place after place.
@@ -246,7 +246,7 @@ fn main() -> ! {
     let slices = SLICE_COSTS.take();
     let mut wire = Wire { reporter: REPORTER.take(), encoder: Encoder::new(0), costs: report_costs, largest_bytes: 0 };
     let capacities = Capacities::new(VERTICES as u8, Filter::capacities(&reference::FILTER), SONARS as u8);
-    wire.reporter.start(Hello::new(0, reference::SEED, capacities), u16::MAX);
+    wire.reporter.start(Hello::new(0, ResetCause::Unknown, reference::SEED, capacities), u16::MAX);
 
     let places_detected = detect(clock, DETECTOR.take(), detector_costs);
     if let Filters::Robot(filter) = filters {
