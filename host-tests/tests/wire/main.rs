@@ -1,8 +1,10 @@
 //! The serial protocol: frames, decoder, reporter and picture, and the specification in `docs/wire.md`.
 
 mod commands;
+mod console;
 mod convergence;
 mod damage;
+mod inbox;
 mod robot;
 mod samples;
 mod schema;
