@@ -87,7 +87,7 @@ pub struct DecoderCounters {
 /// let mut out = [0; MAX_FRAME_BYTES];
 /// let sent = Message::Edge { a: 1, b: 2, present: true };
 /// let mut bytes = Encoder::new(0).encode(&sent, &mut out)?;
-/// let mut decoder = Decoder::new();
+/// let mut decoder: Decoder = Decoder::new();
 /// loop {
 ///     match decoder.feed(bytes) {
 ///         Progress::NeedsMore => break,
