@@ -34,6 +34,12 @@ texts!(FaultKind {
     HistoryFull => "HistoryFull",
     WireFull => "WireFull",
     WireCorrupt => "WireCorrupt",
+    StoreFailed => "StoreFailed",
+    SnapshotRejected => "SnapshotRejected",
+    CommandRefused => "CommandRefused",
+    CommandFlood => "CommandFlood",
+    DriveLost => "DriveLost",
+    LoopLate => "LoopLate",
 });
 
 texts!(Turn {

@@ -2,7 +2,7 @@
 
 use crate::place::{Place, PlaceConfig, PlaceConfigError, PlaceDetector};
 use crate::ring::{RingFrame, RingGeometry};
-use crate::wire::{Capacities, Hello, Message, QueueFull, Reporter};
+use crate::wire::{Capacities, Hello, Message, QueueFull, Reporter, ResetCause};
 use crate::{ConfigError, FaultCounters, Filter, Map, Observation, Turn, Update};
 use core::fmt;
 
@@ -25,6 +25,8 @@ pub struct MapperConfig<const SONARS: usize, C> {
     pub seed: u64,
     /// A number that differs from one start of the robot to the next; 0 when it has none.
     pub boot: u32,
+    /// Why the robot started.
+    pub reset_cause: ResetCause,
 }
 
 /// The stages from the ring frame to the messages of the wire, in one piece of fixed memory: a ring of `SONARS`, and a
@@ -58,8 +60,26 @@ impl<const SONARS: usize, const V: usize, F: Filter<V>> Mapper<SONARS, V, F> {
         self.begins = false;
         self.slices = 0;
         let capacities = Capacities::new(V as u8, F::capacities(&config.filter), SONARS as u8);
-        self.reporter.start(Hello::new(config.boot, config.seed, capacities), FRAMES_PER_HELLO);
+        self.reporter.start(Hello::new(config.boot, config.reset_cause, config.seed, capacities), FRAMES_PER_HELLO);
         Ok(())
+    }
+
+    /// Sends the whole map with the next frames, several pieces each, as [`Reporter::hurry`] does.
+    pub fn hurry(&mut self) {
+        self.reporter.hurry();
+    }
+
+    /// Forgets the map, as [`Mapper::start`] does, and tells the listener.
+    ///
+    /// # Errors
+    /// As [`Mapper::start`].
+    pub fn reset(
+        &mut self,
+        config: &MapperConfig<SONARS, F::Config>,
+        send: impl FnMut(&Message) -> Result<(), QueueFull>,
+    ) -> Result<(), MapperError> {
+        self.reporter.forget(send);
+        self.start(config)
     }
 
     /// Takes one frame of the ring; gives the place and the update when the robot has just been at one. The filter uses

@@ -7,7 +7,7 @@ use crate::{
     ring::RingGeometry,
 };
 #[cfg(feature = "wire")]
-use crate::{Mapper, MapperConfig};
+use crate::{Mapper, MapperConfig, wire::ResetCause};
 
 /// Sonars in the ring.
 pub const SONARS: usize = 16;
@@ -36,8 +36,14 @@ pub type Filter = RobustFilter<HYPOTHESES, VERTICES, HISTORY>;
 pub type RobotMapper = Mapper<SONARS, VERTICES, Filter>;
 /// The settings of all stages of the reference robot.
 #[cfg(feature = "wire")]
-pub const MAPPER: MapperConfig<SONARS, RobustConfig> =
-    MapperConfig { geometry: RING, place: PLACE, filter: FILTER, seed: SEED, boot: 0 };
+pub const MAPPER: MapperConfig<SONARS, RobustConfig> = MapperConfig {
+    geometry: RING,
+    place: PLACE,
+    filter: FILTER,
+    seed: SEED,
+    boot: 0,
+    reset_cause: ResetCause::Unknown,
+};
 
 /// The most particles of the paper's filter, where it stands in for the reference robot's.
 pub const PAPER_PARTICLES: usize = 10;

@@ -1,7 +1,7 @@
 //! All stages in one: what reaches the filter, and what the listener makes of what is sent.
 
 use toposlam::reference::{self, PaperReference, SONARS, VERTICES};
-use toposlam::wire::{Arrival, Belief, Header, Location, Message, Picture, Worst};
+use toposlam::wire::{Arrival, Belief, Header, Location, Message, Picture, ResetCause, Worst};
 use toposlam::{
     ConfigError, FaultCounters, Filter, FilterCapacities, Map, Mapper, MapperConfig, Observation, Turn, Update,
     WeightFactors, WorstNgram,
@@ -67,7 +67,8 @@ impl Filter<VERTICES> for Notes {
 }
 
 fn config<C>(filter: C) -> MapperConfig<SONARS, C> {
-    MapperConfig { geometry: reference::RING, place: reference::PLACE, filter, seed: 1, boot: 0 }
+    let (geometry, place) = (reference::RING, reference::PLACE);
+    MapperConfig { geometry, place, filter, seed: 1, boot: 0, reset_cause: ResetCause::Unknown }
 }
 
 fn simulation() -> Simulation {

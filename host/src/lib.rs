@@ -1,13 +1,16 @@
-//! Laptop side of toposlam: the simulated world, recordings, the emulated robot, pictures of maps, and their evaluation.
+//! Laptop side of toposlam: the simulated world, recordings, the emulated robot, a client of a real one, pictures of maps,
+//! and their evaluation.
 //!
 //! [`world`] stands in for a building and a robot with a ring of sonars, [`recording`] for a real one; both yield the
 //! ring frames that [`mapping`] turns into a map on this computer. [`emulator`] runs the firmware with such frames, and
-//! [`chip`] answers for the chips on its sensor bus. [`picture`] draws a map over its floor plan, and [`evaluation`]
+//! [`chip`] answers for the chips on its sensor bus; [`client`] tells a robot on a [`mod@line`] what to do. [`picture`] draws a map over its floor plan, and [`evaluation`]
 //! measures how often maps are right.
 
 pub mod chip;
+pub mod client;
 pub mod emulator;
 pub mod evaluation;
+pub mod line;
 pub mod mapping;
 pub mod picture;
 pub mod recording;

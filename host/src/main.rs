@@ -9,11 +9,11 @@ use clap::{Parser, Subcommand};
 #[command(version, about)]
 struct Arguments {
     #[command(subcommand)]
-    command: Command,
+    task: Task,
 }
 
 #[derive(Subcommand)]
-enum Command {
+enum Task {
     /// Drive a simulated robot through a floor plan and map it on this computer.
     Simulate(command::simulate::Arguments),
     /// Do the same with the firmware in an emulated STM32F405, and compare the maps bit for bit.
@@ -22,13 +22,16 @@ enum Command {
     Replay(command::replay::Arguments),
     /// Measure how often the maps of many random paths are right.
     Evaluate(command::evaluate::Arguments),
+    /// Tell a robot on a serial line what to do.
+    Command(command::console::Arguments),
 }
 
 fn main() -> anyhow::Result<()> {
-    match Arguments::parse().command {
-        Command::Simulate(arguments) => command::simulate::run(&arguments),
-        Command::Emulate(arguments) => command::emulate::run(&arguments),
-        Command::Replay(arguments) => command::replay::run(&arguments),
-        Command::Evaluate(arguments) => command::evaluate::run(&arguments),
+    match Arguments::parse().task {
+        Task::Simulate(arguments) => command::simulate::run(&arguments),
+        Task::Emulate(arguments) => command::emulate::run(&arguments),
+        Task::Replay(arguments) => command::replay::run(&arguments),
+        Task::Evaluate(arguments) => command::evaluate::run(&arguments),
+        Task::Command(arguments) => command::console::run(&arguments),
     }
 }

@@ -3,7 +3,7 @@
 use toposlam::place::Place;
 use toposlam::reference::{self, PaperReference, VERTICES};
 use toposlam::ring::{RingFrame, RingGeometry};
-use toposlam::wire::{Belief, Worst};
+use toposlam::wire::{Belief, ResetCause, Worst};
 use toposlam::{FaultCounters, Filter, Map, Mapper, MapperConfig, MapperError, Turn, Update};
 
 use crate::evaluation::ancestry::Ancestry;
@@ -174,6 +174,7 @@ fn started<const SONARS: usize, F: Filter<VERTICES>>(
     filter: F::Config,
 ) -> Result<Box<Mapper<SONARS, VERTICES, F>>, MapperError> {
     let mut mapper = Box::new(Mapper::new());
-    mapper.start(&MapperConfig { geometry, place: reference::PLACE, filter, seed: reference::SEED, boot: 0 })?;
+    let (place, seed) = (reference::PLACE, reference::SEED);
+    mapper.start(&MapperConfig { geometry, place, filter, seed, boot: 0, reset_cause: ResetCause::Unknown })?;
     Ok(mapper)
 }

@@ -1,7 +1,13 @@
 //! The command as a person meets it: what it prints, what it writes, and how it fails.
 
+use std::io::{Read, Write};
+use std::net::TcpListener;
 use std::path::Path;
 use std::process::{Command, Output};
+
+use toposlam::wire::{
+    self, Chunk, Encoder, Inbox, Info, MAX_FRAME_BYTES, Message, Outcome, Refusal, ResetCause, Row, Version, crc32,
+};
 
 fn toposlam(arguments: &[&str]) -> Output {
     Command::new(env!("CARGO_BIN_EXE_toposlam")).args(arguments).output().unwrap()
@@ -67,4 +73,120 @@ fn what_cannot_be_read_or_started_is_named_and_fails() {
     let no_image = Path::new(env!("CARGO_MANIFEST_DIR")).join("Cargo.toml");
     let arguments = ["emulate", "--qemu", "no-such-emulator", "--elf", no_image.to_str().unwrap()];
     assert!(complaint(&toposlam(&arguments)).contains("no-such-emulator"));
+}
+
+/// Answers one client on a local port; gives the name of the line and, after the client is gone, the commands that came.
+fn robot(
+    mut answer: impl FnMut(&wire::Command) -> Outcome + Send + 'static,
+) -> (String, std::thread::JoinHandle<Vec<wire::Command>>) {
+    let listener = TcpListener::bind("127.0.0.1:0").unwrap();
+    let line = format!("tcp:{}", listener.local_addr().unwrap());
+    let answering = std::thread::spawn(move || {
+        let (mut stream, _) = listener.accept().unwrap();
+        let (mut inbox, mut encoder) = (Inbox::new(), Encoder::default());
+        let (mut commands, mut bytes) = (Vec::new(), [0; 256]);
+        loop {
+            let count = stream.read(&mut bytes).unwrap_or(0);
+            if count == 0 {
+                return commands;
+            }
+            bytes[..count].iter().for_each(|&byte| inbox.take(byte));
+            let reply = inbox.turn(|command| {
+                commands.push(*command);
+                answer(command)
+            });
+            let row = Row { vertex: 0, radius_mm: 1172, visits: 12, neighbours: 1 };
+            // CRC-32 of the map with that one vertex, see docs/wire.md.
+            let digest =
+                crc32(&[&[1][..], &1172_u16.to_le_bytes(), &12_u32.to_le_bytes(), &1_u64.to_le_bytes()].concat());
+            let map = [Message::Row(row), Message::Map { vertices: 1, edges: 1, digest }];
+            for message in reply.map(Message::Reply).into_iter().chain(map) {
+                let frame = encoder.encode(&message, &mut [0; MAX_FRAME_BYTES]).unwrap().to_vec();
+                stream.write_all(&frame).unwrap();
+            }
+        }
+    });
+    (line, answering)
+}
+
+#[test]
+fn command_tells_a_robot_over_its_line_what_to_do_and_prints_what_it_says() {
+    let info = Info {
+        version: Version { major: 1, minor: 2, patch: 3 },
+        boot: 17,
+        reset_cause: ResetCause::BrownOut,
+        uptime_ms: 61_500,
+        paused: false,
+        localise_only: true,
+        going_to: Some(3),
+        stored_bytes: 2048,
+        stored_places_ago: 7,
+    };
+    let (line, answering) = robot(move |_| Outcome::Info(info));
+    let text = printed(&toposlam(&["command", &line, "info"]));
+    for expected in ["toposlam 1.2.3", "start 17: the supply voltage fell too low", "61.5 s", "vertex 3", "2048 bytes"]
+    {
+        assert!(text.contains(expected), "{text}");
+    }
+    assert_eq!(answering.join().unwrap(), [wire::Command::Info]);
+
+    for (arguments, command) in [
+        (&["reset"][..], wire::Command::Reset),
+        (&["set", "noise-mm", "40"], wire::Command::SetConfig(wire::Setting::NoiseMm(40))),
+        (&["localise-only", "on"], wire::Command::LocaliseOnly { on: true }),
+        (&["go-to", "3"], wire::Command::GoTo { vertex: 3 }),
+        (&["explore"], wire::Command::Explore),
+        (&["pause", "off"], wire::Command::Pause { on: false }),
+    ] {
+        let (line, answering) = robot(|_| Outcome::Done);
+        assert_eq!(printed(&toposlam(&[&["command", &line], arguments].concat())), "done\n");
+        assert_eq!(answering.join().unwrap(), [command]);
+    }
+
+    let (line, answering) = robot(|_| Outcome::Done);
+    let text = printed(&toposlam(&["command", &line, "map"]));
+    assert!(text.contains("map: 1 vertices, 1 edges") && text.contains("radius 1172 mm, 12 visits"), "{text}");
+    assert_eq!(answering.join().unwrap(), [wire::Command::GetMap]);
+}
+
+#[test]
+fn command_writes_a_snapshot_to_a_file_and_sends_it_back() {
+    let directory = tempfile::tempdir().unwrap();
+    let file = directory.path().join("robot.snapshot");
+    let file = file.to_str().unwrap();
+    let snapshot: Vec<u8> = (0..100).collect();
+    let taken = snapshot.clone();
+    let (line, _) = robot(move |command| {
+        let &wire::Command::GetSnapshot { offset } = command else { return Refusal::Unsupported.into() };
+        let bytes = Chunk::new(taken[usize::from(offset)..].iter().copied());
+        Outcome::Snapshot { total: 100, offset, bytes }
+    });
+    assert_eq!(printed(&toposlam(&["command", &line, "snapshot", file])), "100 bytes\n");
+    assert_eq!(std::fs::read(file).unwrap(), snapshot);
+
+    let (line, answering) = robot(|_| Outcome::Done);
+    assert_eq!(printed(&toposlam(&["command", &line, "restore", file])), "100 bytes restored\n");
+    let expected = [
+        wire::Command::RestoreBegin { length: 100, crc: crc32(&snapshot) },
+        wire::Command::RestoreChunk { offset: 0, bytes: Chunk::new(0..64) },
+        wire::Command::RestoreChunk { offset: 64, bytes: Chunk::new(64..100) },
+        wire::Command::RestoreCommit,
+    ];
+    assert_eq!(answering.join().unwrap(), expected);
+}
+
+#[test]
+fn command_says_why_a_robot_did_not_do_it() {
+    let (line, _) = robot(|_| Refusal::UnknownVertex.into());
+    let text = complaint(&toposlam(&["command", &line, "go-to", "99"]));
+    assert!(text.contains("the map has no such vertex"), "{text}");
+    let text = complaint(&toposlam(&["command", "no-such-port", "info"]));
+    assert!(text.contains("opening the serial port no-such-port"), "{text}");
+    let listener = TcpListener::bind("127.0.0.1:0").unwrap();
+    let line = format!("tcp:{}", listener.local_addr().unwrap());
+    let silent = ["command", "--timeout-ms", "10", "--attempts", "2", &line, "info"];
+    let text = complaint(&toposlam(&silent));
+    assert!(text.contains("did not answer 2 requests"), "{text}");
+    let text = complaint(&toposlam(&["command", &line, "set", "no-such-setting", "1"]));
+    assert!(text.contains("noise-mm"), "the settings are listed: {text}");
 }

@@ -56,6 +56,7 @@ fn main() -> ! {
     proof::place();
     proof::mapper();
     proof::wire();
+    proof::commands();
     #[cfg(teeth)]
     black_box(can_panic(black_box(&[1, 2, 3])));
     loop {

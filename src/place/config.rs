@@ -66,7 +66,7 @@ impl PlaceConfig {
     ///
     /// # Errors
     /// The first field that is not.
-    pub(super) const fn check(&self, sonars: usize) -> Result<(), PlaceConfigError> {
+    pub(crate) const fn check(&self, sonars: usize) -> Result<(), PlaceConfigError> {
         if self.equidistance_mm == 0 {
             return Err(PlaceConfigError::EquidistanceMm);
         }

@@ -75,7 +75,7 @@ pub struct Renamed {
 }
 
 impl Renamed {
-    const GONE: u8 = u8::MAX;
+    pub(super) const GONE: u8 = u8::MAX;
 
     /// What the last update of a filter did to the numbers of the first so many vertices; `None` when all kept theirs.
     pub fn of<const V: usize>(filter: &impl Filter<V>, vertices: u8, place_index: u32) -> Option<Self> {

@@ -1,14 +1,15 @@
 //! Bytes to messages: a push decoder that takes whatever the line delivers.
 
 use core::fmt;
+use core::marker::PhantomData;
 
-use super::Message;
 use super::digest::CRC;
-use super::frame::{CRC_BYTES, FRAME_VERSION, HEADER_BYTES, MAX_RAW_BYTES};
+use super::frame::{CRC_BYTES, HEADER_BYTES, MAX_RAW_BYTES};
+use super::{Message, Payload};
 
 /// What came of the bytes that were fed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Progress<'bytes> {
+pub enum Progress<'bytes, M = Message> {
     /// All bytes are taken and no frame is complete yet.
     NeedsMore,
     /// One message is complete.
@@ -16,7 +17,7 @@ pub enum Progress<'bytes> {
         /// The number of its frame and how it follows on the frames before.
         header: Header,
         /// The message.
-        message: Message,
+        message: M,
         /// The bytes that were not read yet: feed them next.
         rest: &'bytes [u8],
     },
@@ -75,7 +76,8 @@ pub struct DecoderCounters {
     pub unknown_message: u32,
 }
 
-/// Takes the bytes of the serial line in pieces of any length and hands out the messages.
+/// Takes the bytes of the serial line in pieces of any length and hands out the messages; on the robot, the
+/// [`Request`](super::Request)s.
 ///
 /// It never blocks and never reads beyond the frame that it hands out. Whatever goes wrong inside a frame, the next
 /// zero byte ends it, and the frame after is read as if nothing had happened. Memory: 160 bytes.
@@ -85,7 +87,7 @@ pub struct DecoderCounters {
 /// let mut out = [0; MAX_FRAME_BYTES];
 /// let sent = Message::Edge { a: 1, b: 2, present: true };
 /// let mut bytes = Encoder::new(0).encode(&sent, &mut out)?;
-/// let mut decoder = Decoder::new();
+/// let mut decoder: Decoder = Decoder::new();
 /// loop {
 ///     match decoder.feed(bytes) {
 ///         Progress::NeedsMore => break,
@@ -102,7 +104,7 @@ pub struct DecoderCounters {
 /// # Ok::<(), toposlam::wire::EncodeError>(())
 /// ```
 #[derive(Clone, Debug)]
-pub struct Decoder {
+pub struct Decoder<M = Message> {
     raw: [u8; MAX_RAW_BYTES],
     length: usize,
     /// How many bytes are left of the COBS block.
@@ -113,9 +115,10 @@ pub struct Decoder {
     last_sequence: Option<u16>,
     last_boot: Option<u32>,
     counters: DecoderCounters,
+    hands_out: PhantomData<fn() -> M>,
 }
 
-impl Decoder {
+impl<M: Payload> Decoder<M> {
     /// Numbers that lie at most so far back are late frames, not a restart.
     const LATE_WINDOW: u16 = 64;
 
@@ -138,6 +141,7 @@ impl Decoder {
                 unknown_version: 0,
                 unknown_message: 0,
             },
+            hands_out: PhantomData,
         }
     }
 
@@ -147,7 +151,7 @@ impl Decoder {
     }
 
     /// Takes bytes up to the end of the next frame. Call again with the rest until it says [`Progress::NeedsMore`].
-    pub fn feed<'bytes>(&mut self, bytes: &'bytes [u8]) -> Progress<'bytes> {
+    pub fn feed<'bytes>(&mut self, bytes: &'bytes [u8]) -> Progress<'bytes, M> {
         let mut rest = bytes;
         while let Some((&byte, tail)) = rest.split_first() {
             rest = tail;
@@ -207,7 +211,7 @@ impl Decoder {
     }
 
     /// Judges what lies between two zeros: the sequence number and the message, unless it is one that is not known here.
-    fn finish(&self) -> Result<(u16, Option<Message>), DecodeError> {
+    fn finish(&self) -> Result<(u16, Option<M>), DecodeError> {
         if self.too_long {
             return Err(DecodeError::TooLong);
         }
@@ -224,11 +228,11 @@ impl Decoder {
         let Some(([version, low, high], payload)) = body.split_first_chunk::<HEADER_BYTES>() else {
             return Err(DecodeError::Cut);
         };
-        if *version != FRAME_VERSION {
+        if *version != M::VERSION {
             return Err(DecodeError::UnknownVersion { version: *version });
         }
         let sequence = u16::from_le_bytes([*low, *high]);
-        match postcard::take_from_bytes::<Message>(payload) {
+        match postcard::take_from_bytes::<M>(payload) {
             Ok((message, [])) => Ok((sequence, Some(message))),
             _ => Ok((sequence, None)),
         }
@@ -242,11 +246,11 @@ impl Decoder {
         }
     }
 
-    fn arrival(&mut self, sequence: u16, message: &Message) -> Arrival {
+    fn arrival(&mut self, sequence: u16, message: &M) -> Arrival {
         let mut restart = false;
-        if let Message::Hello(hello) = message {
-            restart = self.last_boot.is_some_and(|boot| boot != hello.boot);
-            self.last_boot = Some(hello.boot);
+        if let Some(boot) = message.boot() {
+            restart = self.last_boot.is_some_and(|last| last != boot);
+            self.last_boot = Some(boot);
         }
         let arrival = match self.last_sequence.map(|last| sequence.wrapping_sub(last)) {
             None => Arrival::First,
@@ -280,7 +284,7 @@ impl Decoder {
     }
 }
 
-impl Default for Decoder {
+impl<M: Payload> Default for Decoder<M> {
     fn default() -> Self {
         Self::new()
     }
@@ -316,7 +320,7 @@ impl fmt::Display for DecodeError {
             Self::Cut => f.write_str("the frame ends too early"),
             Self::TooLong => f.write_str("the frame is longer than any message"),
             Self::UnknownVersion { version } => {
-                write!(f, "the frame has version {version}, this listener knows {FRAME_VERSION}")
+                write!(f, "the frame has version {version}, which this listener does not know")
             }
             Self::UnknownMessage => f.write_str("the frame holds no message that this listener knows"),
         }

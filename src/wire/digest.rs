@@ -8,6 +8,11 @@ use crate::Map;
 /// CRC-32 ISO-HDLC, the one of zlib and Ethernet. Its table takes 1 KiB of flash.
 pub(super) static CRC: Crc<u32> = Crc::<u32>::new(&CRC_32_ISO_HDLC);
 
+/// CRC-32 ISO-HDLC of some bytes.
+pub fn crc32(bytes: &[u8]) -> u32 {
+    CRC.checksum(bytes)
+}
+
 /// The digest of a map: CRC-32 ISO-HDLC of its canonical bytes, by which a listener tells that it has the same map.
 ///
 /// The canonical bytes are the number of vertices (`u8`) and, for each vertex in order, the radius in millimetres

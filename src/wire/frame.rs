@@ -1,11 +1,12 @@
-//! Messages to frames: COBS( version | sequence | postcard payload | CRC-32 ) and a closing zero.
+//! Messages and requests to frames: COBS( version | sequence | postcard payload | CRC-32 ) and a closing zero.
 
 use core::fmt;
 
 use super::digest::CRC;
-use super::{Echoes, Message};
+use super::{Echoes, Payload};
 
-/// The version of the frame layout and of everything that could break an old listener; the first byte of every frame.
+/// The version of the frame layout and of everything that could break an old listener; the first byte of every frame. In a
+/// frame to the robot its top bit is set, so that a line that echoes what the robot says gives no commands.
 pub const FRAME_VERSION: u8 = 1;
 
 /// The version and the sequence number.
@@ -23,7 +24,7 @@ pub const MAX_FRAME_BYTES: usize = MAX_RAW_BYTES + 2;
 
 const _: () = assert!(MAX_RAW_BYTES < 254, "the short COBS here knows no block of 254 bytes");
 
-/// Packs messages into frames and numbers them.
+/// Packs messages, or requests, into frames and numbers them.
 ///
 /// A frame that the transmit queue then refuses keeps its number: the listener sees the gap and knows that it missed
 /// something. Send one zero byte before the first frame, so that noise from the start does not spoil it.
@@ -38,14 +39,14 @@ impl Encoder {
         Self { sequence: first_sequence }
     }
 
-    /// Packs one message into `out` and returns the bytes of the frame, its closing zero included.
+    /// Packs one message or request into `out` and returns the bytes of the frame, its closing zero included.
     ///
     /// A buffer of [`MAX_FRAME_BYTES`] is always enough. Cost: linear in the length; the frame
     /// before stuffing lies on the stack.
     ///
     /// # Errors
     /// [`EncodeError::OutputTooShort`] when the frame does not fit into `out`; no sequence number is used up.
-    pub fn encode<'out>(&mut self, message: &Message, out: &'out mut [u8]) -> Result<&'out [u8], EncodeError> {
+    pub fn encode<'out>(&mut self, message: &impl Payload, out: &'out mut [u8]) -> Result<&'out [u8], EncodeError> {
         let mut raw = [0; MAX_RAW_BYTES];
         let length = fill_raw(self.sequence, message, &mut raw).ok_or(EncodeError::MessageTooLong)?;
         let raw = raw.get(..length).ok_or(EncodeError::MessageTooLong)?;
@@ -56,9 +57,9 @@ impl Encoder {
 }
 
 /// Writes header, payload and CRC; returns how many bytes that took.
-fn fill_raw(sequence: u16, message: &Message, raw: &mut [u8; MAX_RAW_BYTES]) -> Option<usize> {
+fn fill_raw<M: Payload>(sequence: u16, message: &M, raw: &mut [u8; MAX_RAW_BYTES]) -> Option<usize> {
     let [version, low, high, rest @ ..] = raw;
-    *version = FRAME_VERSION;
+    *version = M::VERSION;
     [*low, *high] = sequence.to_le_bytes();
     let payload = postcard::to_slice(message, rest.get_mut(..MAX_PAYLOAD_BYTES)?).ok()?.len();
     let end = HEADER_BYTES + payload;
@@ -112,6 +113,7 @@ impl core::error::Error for EncodeError {}
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::wire::Message;
 
     #[test]
     fn cobs_gives_the_published_examples() {

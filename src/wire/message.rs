@@ -4,14 +4,15 @@ use core::fmt;
 
 use serde::{Deserialize, Serialize};
 
-use super::{Belief, Echoes, Renamed, Worst};
+use super::code::codes;
+use super::{Belief, Drive, Echoes, Journey, Renamed, Reply, Worst};
 use crate::{FilterCapacities, Fingerprint, Update};
 
-/// The version of the message set; it grows by one whenever messages are appended.
-pub const PROTOCOL_VERSION: u16 = 2;
+/// The version of the messages and requests; it grows by one whenever some are appended.
+pub const PROTOCOL_VERSION: u16 = 3;
 
-/// FNV-1a (64 bit) of the description of all messages that `docs/wire.md` prints; a test recomputes it from the types.
-pub const SCHEMA_HASH: u64 = 0x4F39_CE1F_451B_B26E;
+/// FNV-1a (64 bit) of the description of all messages and requests that `docs/wire.md` prints; a test recomputes it from the types.
+pub const SCHEMA_HASH: u64 = 0x06A5_446B_0B1D_C83D;
 
 /// One message from the robot. All of them but [`Message::Renamed`] state facts in absolute terms and are no increment.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -85,6 +86,12 @@ pub enum Message {
     Renamed(Renamed),
     /// What the map explains worst.
     Worst(Worst),
+    /// The answer to a request.
+    Reply(Reply),
+    /// Where the drive steers, once for each ring frame.
+    Drive(Drive),
+    /// How the way to a vertex goes that the robot was told to go to.
+    Journey(Journey),
 }
 
 /// Who is speaking.
@@ -96,6 +103,8 @@ pub struct Hello {
     pub schema_hash: u64,
     /// A number that differs from one start of the robot to the next (a counter in flash, or noise); 0 when it has none.
     pub boot: u32,
+    /// Why the robot started.
+    pub reset_cause: ResetCause,
     /// The seed of the random draws, with which a host can repeat the run.
     pub seed: u64,
     /// What the robot has room for.
@@ -104,8 +113,8 @@ pub struct Hello {
 
 impl Hello {
     /// The introduction of a robot that runs this version of the library.
-    pub const fn new(boot: u32, seed: u64, capacities: Capacities) -> Self {
-        Self { protocol_version: PROTOCOL_VERSION, schema_hash: SCHEMA_HASH, boot, seed, capacities }
+    pub const fn new(boot: u32, reset_cause: ResetCause, seed: u64, capacities: Capacities) -> Self {
+        Self { protocol_version: PROTOCOL_VERSION, schema_hash: SCHEMA_HASH, boot, reset_cause, seed, capacities }
     }
 
     /// Whether this version of the library understands the speaker.
@@ -120,6 +129,26 @@ impl Hello {
             return Err(HelloError::SchemaDiffers { ours: SCHEMA_HASH, theirs: self.schema_hash });
         }
         Ok(())
+    }
+}
+
+codes! {
+    /// Why a robot started.
+    ResetCause {
+        /// Nobody can tell.
+        Unknown => "for an unknown reason",
+        /// The power was switched on.
+        PowerOn = 1 => "the power was switched on",
+        /// The supply voltage fell too low.
+        BrownOut = 2 => "the supply voltage fell too low",
+        /// The reset pin was pulled.
+        ResetPin = 3 => "the reset pin was pulled",
+        /// The watchdog was not fed in time.
+        Watchdog = 4 => "the watchdog was not fed",
+        /// The program asked for it.
+        Software = 5 => "the program restarted itself",
+        /// The chip was to sleep in a way that it may not.
+        LowPower = 6 => "the chip went to sleep wrongly",
     }
 }
 

@@ -1,13 +1,18 @@
-//! The serial protocol: what the robot knows, as postcard messages in COBS frames (`docs/wire.md` is the specification).
+//! The serial protocol: what the robot knows and what it can be told, as postcard messages in COBS frames (`docs/wire.md` is
+//! the specification).
 //!
 //! ```text
 //! robot: Filter, faults ─▶ Reporter ─Message▶ Encoder ─bytes▶ serial line
 //! listener: serial line ─bytes▶ Decoder ─Message▶ Picture
+//!
+//! client: Request ─▶ Encoder ─bytes▶ serial line
+//! robot: serial line ─bytes▶ Inbox ─Command▶ main loop ─Outcome▶ Inbox ─Reply▶ as a Message
 //! ```
 //!
-//! There is no back channel. Every message but [`Message::Renamed`] states a fact in absolute terms, and
+//! A listener needs no back channel. Every message but [`Message::Renamed`] states a fact in absolute terms, and
 //! the [`Reporter`] repeats the whole map in turn, so that a listener who joins late or loses frames converges; it
-//! learns that it has from a digest of the map. All of it is `no_std` and neither blocks nor allocates.
+//! learns that it has from a digest of the map. A client repeats its [`Request`] until it hears the [`Reply`]. All of it is
+//! `no_std` and neither blocks nor allocates.
 //!
 //! ```
 //! use toposlam::wire::{Decoder, Encoder, MAX_FRAME_BYTES, Message, Picture, Progress};
@@ -24,23 +29,38 @@
 //! ```
 
 mod belief;
+mod code;
+mod command;
 mod decoder;
 mod digest;
+mod drive;
 mod echoes;
 mod frame;
+mod inbox;
 mod list;
 mod message;
+mod payload;
 mod picture;
+mod reply;
 mod reporter;
+mod setting;
+mod staging;
 
 pub use belief::{Belief, PlaceProbability, Renamed, Worst};
+pub use command::{CHUNK_BYTES, Chunk, Command, Request};
 pub use decoder::{Arrival, DecodeError, Decoder, DecoderCounters, Header, Progress};
-pub use digest::map_digest;
+pub use digest::{crc32, map_digest};
+pub use drive::{Drive, Journey, JourneyState};
 pub use echoes::Echoes;
 pub use frame::{EncodeError, Encoder, FRAME_VERSION, MAX_FRAME_BYTES};
+pub use inbox::Inbox;
 pub use list::List;
 pub use message::{
-    Capacities, Evidence, Health, Hello, HelloError, Location, Message, PROTOCOL_VERSION, Row, SCHEMA_HASH,
+    Capacities, Evidence, Health, Hello, HelloError, Location, Message, PROTOCOL_VERSION, ResetCause, Row, SCHEMA_HASH,
 };
+pub use payload::Payload;
 pub use picture::Picture;
+pub use reply::{Info, Outcome, Refusal, Reply, Version};
 pub use reporter::{QueueFull, Reporter};
+pub use setting::{Setting, Settings};
+pub use staging::Staging;

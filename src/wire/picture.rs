@@ -3,14 +3,14 @@
 use super::decoder::{Arrival, Header};
 use super::digest::rows_digest;
 use super::reporter::bit;
-use super::{Belief, Evidence, Health, Hello, Location, Message, Renamed, Row, Worst};
+use super::{Belief, Evidence, Health, Hello, Journey, Location, Message, Renamed, Row, Worst};
 use crate::FaultKind;
 use crate::map::bits;
 
 /// The map as heard so far, and whether it is the robot's.
 ///
 /// Any message may be missing, doubled or late: late ones are ignored, and what is missing comes round with the
-/// rolling picture. `V` has to be at least the robot's; 64 always is. Memory: 16 bytes for each vertex and about 230 bytes.
+/// rolling picture. `V` has to be at least the robot's; 64 always is. Memory: 16 bytes for each vertex and about 280 bytes.
 #[derive(Clone, Debug)]
 pub struct Picture<const V: usize> {
     vertices: u8,
@@ -26,6 +26,7 @@ pub struct Picture<const V: usize> {
     health: Option<Health>,
     belief: Option<Belief>,
     worst: Option<Worst>,
+    journey: Option<Journey>,
     faults: [u32; FaultKind::ALL.len()],
 }
 
@@ -45,11 +46,12 @@ impl<const V: usize> Picture<V> {
             health: None,
             belief: None,
             worst: None,
+            journey: None,
             faults: [0; FaultKind::ALL.len()],
         }
     }
 
-    /// Takes in one message. `Place` and `Ring` leave no trace here; a vertex beyond `V` is left out.
+    /// Takes in one message. `Place`, `Ring`, `Drive` and `Reply` leave no trace here; a vertex beyond `V` is left out.
     pub fn apply(&mut self, header: Header, message: &Message) {
         match header.arrival {
             Arrival::Late => return,
@@ -82,7 +84,8 @@ impl<const V: usize> Picture<V> {
             Message::Belief(belief) => self.belief = Some(belief),
             Message::Renamed(renamed) => self.rename(&renamed),
             Message::Worst(worst) => self.worst = Some(worst),
-            Message::Place { .. } | Message::Ring { .. } => {}
+            Message::Journey(journey) => self.journey = Some(journey),
+            Message::Place { .. } | Message::Ring { .. } | Message::Drive(_) | Message::Reply(_) => {}
         }
     }
 
@@ -149,6 +152,11 @@ impl<const V: usize> Picture<V> {
         self.worst
     }
 
+    /// How the way to a vertex goes, as last heard.
+    pub const fn journey(&self) -> Option<Journey> {
+        self.journey
+    }
+
     /// How often a kind of fault was seen, as far as heard.
     pub fn fault(&self, kind: FaultKind) -> u32 {
         self.faults.get(kind as usize).copied().unwrap_or(0)
@@ -165,6 +173,7 @@ impl<const V: usize> Picture<V> {
             belief.rename(renamed);
         }
         self.worst = self.worst.and_then(|worst| worst.renamed(renamed));
+        self.journey = self.journey.and_then(|journey| journey.renamed(renamed));
     }
 
     fn set_label(&mut self, vertex: u8, radius_mm: u16, visits: u32) {

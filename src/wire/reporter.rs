@@ -3,7 +3,7 @@
 use core::fmt;
 
 use super::digest::{map_digest, row_of};
-use super::{Belief, Capacities, Evidence, Hello, Location, Message, Renamed, Row, Worst};
+use super::{Belief, Capacities, Evidence, Hello, List, Location, Message, Renamed, ResetCause, Row, Worst};
 use crate::{FaultCounters, FaultKind, Filter, Map, Update};
 
 /// Decides what to send. It keeps what the listener was last told and hands each message to a callback, which says
@@ -28,16 +28,28 @@ pub struct Reporter<const V: usize> {
     /// Whose turn it is in the rolling picture: a vertex, or one of the turns that follow the last vertex.
     turn: u8,
     fault_turn: u8,
+    /// Whether the rest of the round goes out fast.
+    hurries: bool,
     refused: u32,
 }
 
 impl<const V: usize> Reporter<V> {
+    /// How many pieces of the rolling picture a tick sends in a hurry.
+    const PIECES_IN_A_HURRY: u8 = 4;
+
     /// A reporter that has to be started.
     pub const fn new() -> Self {
         let capacities =
             Capacities { vertices: 0, hypotheses: 0, history: 0, ngram_length: 0, fingerprint_step_mm: 0, sonars: 0 };
         Self {
-            hello: Hello { protocol_version: 0, schema_hash: 0, boot: 0, seed: 0, capacities },
+            hello: Hello {
+                protocol_version: 0,
+                schema_hash: 0,
+                boot: 0,
+                reset_cause: ResetCause::Unknown,
+                seed: 0,
+                capacities,
+            },
             ticks_per_hello: 0,
             ticks_to_hello: 0,
             vertices: 0,
@@ -49,6 +61,7 @@ impl<const V: usize> Reporter<V> {
             faults: [0; FaultKind::ALL.len()],
             turn: 0,
             fault_turn: 0,
+            hurries: false,
             refused: 0,
         }
     }
@@ -68,7 +81,35 @@ impl<const V: usize> Reporter<V> {
         self.faults = [0; FaultKind::ALL.len()];
         self.turn = 0;
         self.fault_turn = 0;
+        self.hurries = false;
         self.refused = 0;
+    }
+
+    /// Begins a round of the rolling picture, with an introduction, of which every tick sends four pieces; after the round the
+    /// pace is the usual one again. A listener who asks for the map has it after `vertices / 4 + 1` ticks in which
+    /// no frame is lost.
+    pub fn hurry(&mut self) {
+        self.ticks_to_hello = 0;
+        self.turn = 0;
+        self.hurries = true;
+    }
+
+    /// Before the map is forgotten or another one takes its place: tells that every vertex is gone. To be followed by
+    /// [`Reporter::start`], or by updates and ticks with the other map.
+    pub fn forget(&mut self, mut send: impl FnMut(&Message) -> Result<(), QueueFull>) {
+        let vertices = self.vertices.max(self.vertices_before);
+        if vertices == 0 {
+            return;
+        }
+        let place_index = self.location.map_or(0, |location| location.place_index);
+        let names = List::new((0..vertices).map(|_| Renamed::GONE));
+        let renamed = Renamed { place_index, names };
+        if self.send(&Message::Renamed(renamed), &mut send) {
+            self.tell_renamed(&renamed);
+        }
+        self.vertices_before = 0;
+        self.location = None;
+        self.belief = None;
     }
 
     /// How many messages the queue refused since the start; saturates.
@@ -148,7 +189,7 @@ impl<const V: usize> Reporter<V> {
     ///
     /// The pieces are every vertex of the map, the size of the map, the location, the belief, and one fault that was ever
     /// seen. A listener that hears the `vertices + 4` ticks of one round without a loss has converged. At most one message for
-    /// each kind of fault, a `Hello` and a piece.
+    /// each kind of fault, a `Hello` and a piece, or four pieces in a hurry.
     pub fn tick(
         &mut self,
         map: &Map<V>,
@@ -164,17 +205,36 @@ impl<const V: usize> Reporter<V> {
                 self.send_fault(kind, faults.of(kind), &mut send);
             }
         }
+        for _ in 0..if self.hurries { Self::PIECES_IN_A_HURRY } else { 1 } {
+            if !self.send_piece(map, faults, &mut send) {
+                return;
+            }
+            if self.turn == 0 {
+                self.hurries = false;
+                return;
+            }
+        }
+    }
+
+    /// Sends the next piece of the rolling picture, unless it is one of nothing; tells whether it is the turn of the next.
+    fn send_piece(
+        &mut self,
+        map: &Map<V>,
+        faults: &FaultCounters,
+        send: &mut impl FnMut(&Message) -> Result<(), QueueFull>,
+    ) -> bool {
         let vertices = map.vertices();
         let done = match self.turn.checked_sub(vertices) {
-            None => self.send_row(row_of(map, self.turn), &mut send),
-            Some(0) => self.send_size(map, &mut send),
-            Some(1) => self.location.is_none_or(|location| self.send(&Message::Location(location), &mut send)),
-            Some(2) => self.belief.is_none_or(|belief| self.send(&Message::Belief(belief), &mut send)),
-            Some(_) => self.next_fault(faults).is_none_or(|kind| self.send_fault(kind, faults.of(kind), &mut send)),
+            None => self.send_row(row_of(map, self.turn), send),
+            Some(0) => self.send_size(map, send),
+            Some(1) => self.location.is_none_or(|location| self.send(&Message::Location(location), send)),
+            Some(2) => self.belief.is_none_or(|belief| self.send(&Message::Belief(belief), send)),
+            Some(_) => self.next_fault(faults).is_none_or(|kind| self.send_fault(kind, faults.of(kind), send)),
         };
         if done {
             self.turn = if self.turn >= vertices.saturating_add(3) { 0 } else { self.turn.saturating_add(1) };
         }
+        done
     }
 
     fn send(&mut self, message: &Message, send: &mut impl FnMut(&Message) -> Result<(), QueueFull>) -> bool {

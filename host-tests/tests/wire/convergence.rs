@@ -3,9 +3,10 @@
 use super::frame;
 use super::robot::{Random, Robot, TICKS_PER_HELLO};
 use toposlam::wire::{
-    Belief, Decoder, Evidence, List, Location, Message, Picture, PlaceProbability, Progress, Renamed, Worst, map_digest,
+    Belief, Decoder, Evidence, List, Location, Message, Picture, PlaceProbability, Progress, QueueFull, Renamed, Worst,
+    map_digest,
 };
-use toposlam::{FaultKind, Fingerprint, Map, Update, WorstNgram};
+use toposlam::{FaultCounters, FaultKind, Fingerprint, Map, Update, WorstNgram};
 
 const V: usize = 16;
 
@@ -352,4 +353,34 @@ fn a_map_of_64_vertices_arrives_whole() {
     let mut listener = Listener::<64>::new();
     robot.place(&mut random).iter().for_each(|frame| listener.hear(frame));
     assert!(listener.picture.is_converged() && same(&listener.picture, &robot.filter.map));
+}
+
+#[test]
+fn the_whole_picture_goes_out_in_a_quarter_of_the_ticks_and_then_at_the_usual_pace() {
+    let mut random = Random(11);
+    let mut robot = Robot::<V>::new(1);
+    while robot.filter.map.vertices() < 14 {
+        robot.drive(&mut random);
+        robot.place(&mut random);
+    }
+    robot.tick(&mut random);
+    let usual = robot.tick(&mut random).len();
+    robot.reporter.hurry();
+    let lengths: Vec<usize> = (0..7).map(|_| robot.tick(&mut random).len()).collect();
+    assert_eq!(usual, 1);
+    // An introduction, 14 rows, the size, the location, the belief, and no fault.
+    assert_eq!(lengths, [5, 4, 4, 4, 1, 1, 1]);
+    // A queue that is full holds the rest of the round back.
+    robot.reporter.hurry();
+    let mut sent = 0;
+    let mut calls = 0;
+    while sent < 18 {
+        robot.reporter.tick(&robot.filter.map, &FaultCounters::new(), |message| {
+            calls += 1;
+            let is_taken = calls % 3 == 0;
+            sent += usize::from(is_taken && !matches!(message, Message::Hello(_)));
+            if is_taken { Ok(()) } else { Err(QueueFull) }
+        });
+        assert!(calls < 100);
+    }
 }

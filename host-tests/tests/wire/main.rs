@@ -1,17 +1,20 @@
 //! The serial protocol: frames, decoder, reporter and picture, and the specification in `docs/wire.md`.
 
+mod commands;
+mod console;
 mod convergence;
 mod damage;
+mod inbox;
 mod robot;
 mod samples;
 mod schema;
 mod specification;
 
 use samples::{largest, typical};
-use toposlam::wire::{Arrival, Decoder, Encoder, Header, MAX_FRAME_BYTES, Message, Progress};
+use toposlam::wire::{Arrival, Decoder, Encoder, Header, MAX_FRAME_BYTES, Message, Payload, Progress};
 
-/// The frame of a message.
-fn frame(encoder: &mut Encoder, message: &Message) -> Vec<u8> {
+/// The frame of a message or a request.
+fn frame(encoder: &mut Encoder, message: &impl Payload) -> Vec<u8> {
     encoder.encode(message, &mut [0; MAX_FRAME_BYTES]).expect("every message fits the largest frame").to_vec()
 }
 

@@ -1,7 +1,7 @@
 //! A robot whose map changes at random, and what it sends.
 
 use super::frame;
-use toposlam::wire::{Capacities, Encoder, Hello, Message, QueueFull, Reporter};
+use toposlam::wire::{Capacities, Encoder, Hello, Message, QueueFull, Reporter, ResetCause};
 use toposlam::{
     ConfigError, FaultCounters, FaultKind, Filter, FilterCapacities, Fingerprint, Map, Observation, Update,
     WeightFactors, WorstNgram,
@@ -115,7 +115,7 @@ impl<const V: usize> Robot<V> {
             sonars: 16,
         };
         let mut reporter = Reporter::new();
-        reporter.start(Hello::new(boot, 1, capacities), TICKS_PER_HELLO);
+        reporter.start(Hello::new(boot, ResetCause::Unknown, 1, capacities), TICKS_PER_HELLO);
         Self {
             filter: Believer::UNSTARTED,
             faults: FaultCounters::new(),
@@ -248,7 +248,7 @@ impl<const V: usize> Robot<V> {
         reporter.tick(&filter.map, faults, |message| {
             queue(encoder, message, random.happens(*refused_percent), &mut frames)
         });
-        assert!(frames.len() <= FaultKind::ALL.len() + 2);
+        assert!(frames.len() <= FaultKind::ALL.len() + 5);
         frames
     }
 }

@@ -1,12 +1,14 @@
-//! One typical and one largest message of every kind.
+//! One typical and one largest message and request of every kind.
 
 use toposlam::Fingerprint;
 use toposlam::ring::Echo;
 use toposlam::wire::{
-    Belief, Capacities, Echoes, Evidence, Health, Hello, List, Location, Message, PlaceProbability, Renamed, Row, Worst,
+    Belief, CHUNK_BYTES, Capacities, Chunk, Command, Drive, Echoes, Evidence, Health, Hello, Info, Journey,
+    JourneyState, List, Location, Message, Outcome, PlaceProbability, Refusal, Renamed, Reply, Request, ResetCause,
+    Row, Setting, Version, Worst,
 };
 
-/// A plausible message of every kind, in the order of their numbers.
+/// A plausible message of every kind, in the order of their numbers; a reply of every kind.
 pub(crate) fn typical() -> Vec<Message> {
     let capacities = Capacities {
         vertices: 16,
@@ -20,7 +22,7 @@ pub(crate) fn typical() -> Vec<Message> {
     ring[3] = Echo::Silence;
     ring[7] = Echo::Dead;
     vec![
-        Message::Hello(Hello::new(17, 1, capacities)),
+        Message::Hello(Hello::new(17, ResetCause::BrownOut, 1, capacities)),
         Message::Place { place_index: 42, frame_index: 5310, radius_mm: 1172, degree: Some(3) },
         Message::Map { vertices: 11, edges: 13, digest: 0x8C3A_51F0 },
         Message::Vertex { vertex: 3, radius_mm: 1172, visits: 12 },
@@ -56,7 +58,85 @@ pub(crate) fn typical() -> Vec<Message> {
             newest_age: 17,
             vertices: List::new([3, 7, 4, 7, 3]),
         }),
+        reply(Outcome::Done),
+        reply(Outcome::Info(Info {
+            version: Version { major: 0, minor: 1, patch: 0 },
+            boot: 17,
+            reset_cause: ResetCause::BrownOut,
+            uptime_ms: 345_000,
+            paused: false,
+            localise_only: true,
+            going_to: Some(3),
+            stored_bytes: 2048,
+            stored_places_ago: 7,
+        })),
+        reply(Outcome::Snapshot { total: 2048, offset: 64, bytes: Chunk::new(0..8) }),
+        reply(Outcome::Refused(Refusal::UnknownVertex)),
+        Message::Drive(Drive { frame_index: 5310, heading_mrad: -250, speed_permille: 700, state: 2 }),
+        Message::Journey(Journey { vertex: 3, state: JourneyState::Underway }),
     ]
+}
+
+fn reply(outcome: Outcome) -> Message {
+    Message::Reply(Reply { request: 300, outcome })
+}
+
+/// A plausible request of every kind, in the order of their numbers; each setting in turn.
+pub(crate) fn requests() -> Vec<Request> {
+    let commands = [
+        Command::Info,
+        Command::GetMap,
+        Command::GetSnapshot { offset: 64 },
+        Command::RestoreBegin { length: 2048, crc: 0x8C3A_51F0 },
+        Command::RestoreChunk { offset: 64, bytes: Chunk::new(0..8) },
+        Command::RestoreCommit,
+        Command::Reset,
+    ];
+    let settings = [
+        Setting::NoiseMm(40),
+        Setting::Hypotheses(8),
+        Setting::Moves(2),
+        Setting::WrongTurnPermille(20),
+        Setting::WrongDegreePermille(100),
+        Setting::EquidistanceMm(150),
+        Setting::LeaveMm(300),
+        Setting::SpeedPermille(700),
+        Setting::SnapshotEveryPlaces(10),
+    ];
+    let later = [
+        Command::LocaliseOnly { on: true },
+        Command::GoTo { vertex: 3 },
+        Command::Explore,
+        Command::Pause { on: true },
+    ];
+    let commands = commands.into_iter().chain(settings.map(Command::SetConfig)).chain(later);
+    (300..).zip(commands).map(|(id, command)| Request { id, command }).collect()
+}
+
+/// Every kind of request with the values that take the most bytes.
+pub(crate) fn largest_requests() -> Vec<Request> {
+    let widen = |command| match command {
+        Command::GetSnapshot { .. } => Command::GetSnapshot { offset: u16::MAX },
+        Command::RestoreBegin { .. } => Command::RestoreBegin { length: u16::MAX, crc: u32::MAX },
+        Command::RestoreChunk { .. } => {
+            Command::RestoreChunk { offset: u16::MAX, bytes: Chunk::new([u8::MAX; CHUNK_BYTES]) }
+        }
+        Command::SetConfig(setting) => Command::SetConfig(match setting {
+            Setting::NoiseMm(_) => Setting::NoiseMm(u16::MAX),
+            Setting::Hypotheses(_) => Setting::Hypotheses(u16::MAX),
+            Setting::Moves(_) => Setting::Moves(u16::MAX),
+            Setting::WrongTurnPermille(_) => Setting::WrongTurnPermille(u16::MAX),
+            Setting::WrongDegreePermille(_) => Setting::WrongDegreePermille(u16::MAX),
+            Setting::EquidistanceMm(_) => Setting::EquidistanceMm(u16::MAX),
+            Setting::LeaveMm(_) => Setting::LeaveMm(u16::MAX),
+            Setting::SpeedPermille(_) => Setting::SpeedPermille(u16::MAX),
+            Setting::SnapshotEveryPlaces(_) => Setting::SnapshotEveryPlaces(u16::MAX),
+            other => other,
+        }),
+        Command::GoTo { .. } => Command::GoTo { vertex: u8::MAX },
+        other => other,
+    };
+    requests().into_iter().map(|Request { command, .. }| Request { id: u16::MAX, command: widen(command) }).collect()
 }
 
 /// Every kind with the values that take the most bytes.
@@ -73,7 +153,14 @@ pub(crate) fn largest() -> Vec<Message> {
         sonars: BYTE,
     };
     vec![
-        Message::Hello(Hello { protocol_version: SHORT, schema_hash: !0, boot: WORD, seed: !0, capacities }),
+        Message::Hello(Hello {
+            protocol_version: SHORT,
+            schema_hash: !0,
+            boot: WORD,
+            reset_cause: ResetCause::LowPower,
+            seed: !0,
+            capacities,
+        }),
         Message::Place { place_index: WORD, frame_index: WORD, radius_mm: SHORT, degree: Some(BYTE) },
         Message::Map { vertices: BYTE, edges: SHORT, digest: WORD },
         Message::Vertex { vertex: BYTE, radius_mm: SHORT, visits: WORD },
@@ -109,5 +196,25 @@ pub(crate) fn largest() -> Vec<Message> {
             newest_age: SHORT,
             vertices: List::new([BYTE; 7]),
         }),
+        largest_reply(Outcome::Done),
+        largest_reply(Outcome::Info(Info {
+            version: Version { major: BYTE, minor: BYTE, patch: BYTE },
+            boot: WORD,
+            reset_cause: ResetCause::LowPower,
+            uptime_ms: WORD,
+            paused: true,
+            localise_only: true,
+            going_to: Some(BYTE),
+            stored_bytes: SHORT,
+            stored_places_ago: WORD,
+        })),
+        largest_reply(Outcome::Snapshot { total: SHORT, offset: SHORT, bytes: Chunk::new([BYTE; CHUNK_BYTES]) }),
+        largest_reply(Outcome::Refused(Refusal::Busy)),
+        Message::Drive(Drive { frame_index: WORD, heading_mrad: i16::MIN, speed_permille: i16::MIN, state: BYTE }),
+        Message::Journey(Journey { vertex: BYTE, state: JourneyState::Replaced }),
     ]
+}
+
+fn largest_reply(outcome: Outcome) -> Message {
+    Message::Reply(Reply { request: u16::MAX, outcome })
 }

@@ -1,12 +1,13 @@
-//! The schema: a description of all messages, taken from the types themselves by a serde serializer.
+//! The schema: a description of all messages and requests, taken from the types themselves by a serde serializer.
 
-use super::samples::typical;
+use super::samples::{requests, typical};
 use serde::ser::{self, Serialize};
-use toposlam::wire::SCHEMA_HASH;
+use toposlam::wire::{Decoder, Message, Payload, Progress, Request, SCHEMA_HASH};
 
-/// One line for each message: its number, its name, and the names and types of its fields.
+/// One line for each message, reply and command: its number, its name, and the names and types of its fields.
 pub(crate) fn description() -> String {
-    typical().iter().map(|message| describe(message) + "\n").collect()
+    let messages = typical().into_iter().map(|message| describe(&message));
+    messages.chain(requests().iter().map(describe)).map(|line| line + "\n").collect()
 }
 
 /// FNV-1a, 64 bit.
@@ -26,24 +27,63 @@ fn the_pinned_schema_hash_is_that_of_the_types() {
 
 #[test]
 fn the_samples_hold_every_message_in_the_order_of_its_number() {
-    let names: Vec<_> = typical()
-        .iter()
-        .map(|message| describe(message).split([' ', '(']).nth(1).unwrap_or_default().to_owned())
-        .collect();
     let expected = [
         "Hello", "Place", "Map", "Vertex", "Edge", "Location", "Evidence", "Row", "Fault", "Health", "Ring", "Belief",
-        "Renamed", "Worst",
+        "Renamed", "Worst", "Reply", "Drive", "Journey",
     ];
-    assert_eq!(names, expected);
-    for (number, message) in typical().iter().enumerate() {
-        assert!(describe(message).starts_with(&format!("{number} ")));
+    let mut described: Vec<_> = typical().iter().map(describe).collect();
+    described.dedup_by_key(|line| line.split(' ').next().map(str::to_owned));
+    for (number, line) in described.iter().enumerate() {
+        assert!(line.starts_with(&format!("{number} {}", expected[number])), "{line}");
     }
-    // Zeros are a value of every type: a message with the next number would be heard, and need a sample here.
-    for zeros in 0..100 {
-        let mut body = vec![1, 0, 0, expected.len() as u8];
+    assert_eq!(described.len(), expected.len());
+    // A message or an outcome with the next number would need a sample here.
+    assert!(!is_known::<Message>(&[expected.len() as u8]));
+    assert!(is_known::<Message>(&[14, 0, 3]) && !is_known::<Message>(&[14, 0, 4]));
+}
+
+#[test]
+fn the_samples_hold_every_command_and_setting_in_the_order_of_its_number() {
+    let expected = [
+        "0 Info",
+        "1 GetMap",
+        "2 GetSnapshot",
+        "3 RestoreBegin",
+        "4 RestoreChunk",
+        "5 RestoreCommit",
+        "6 Reset",
+        "7 SetConfig(0 NoiseMm",
+        "7 SetConfig(1 Hypotheses",
+        "7 SetConfig(2 Moves",
+        "7 SetConfig(3 WrongTurnPermille",
+        "7 SetConfig(4 WrongDegreePermille",
+        "7 SetConfig(5 EquidistanceMm",
+        "7 SetConfig(6 LeaveMm",
+        "7 SetConfig(7 SpeedPermille",
+        "7 SetConfig(8 SnapshotEveryPlaces",
+        "8 LocaliseOnly",
+        "9 GoTo",
+        "10 Explore",
+        "11 Pause",
+    ];
+    let described: Vec<_> = requests().iter().map(describe).collect();
+    for (line, expected) in described.iter().zip(expected) {
+        assert!(line.starts_with(&format!("Request {{ id: u16, command: {expected}")), "{line}");
+    }
+    assert_eq!(described.len(), expected.len());
+    assert!(is_known::<Request>(&[0, 11]) && !is_known::<Request>(&[0, 12]));
+    assert!(is_known::<Request>(&[0, 7, 8]) && !is_known::<Request>(&[0, 7, 9]));
+}
+
+/// Whether bytes begin a message or request that is known: zeros are a value of every type.
+fn is_known<M: Payload>(begin: &[u8]) -> bool {
+    (0..100).any(|zeros| {
+        let mut body = vec![M::VERSION, 0, 0];
+        body.extend(begin);
         body.resize(body.len() + zeros, 0);
-        assert_eq!(super::hear(&super::damage::with_crc(&body)).messages, []);
-    }
+        let mut decoder = Decoder::<M>::new();
+        matches!(decoder.feed(&super::damage::with_crc(&body)), Progress::Message { .. })
+    })
 }
 
 #[test]
@@ -135,11 +175,14 @@ impl ser::Serializer for Describer {
         serialize_none() -> Described,
         serialize_unit() -> Described,
         serialize_unit_struct(&'static str) -> Described,
-        serialize_unit_variant(&'static str, u32, &'static str) -> Described,
         serialize_tuple(usize) -> Result<Self::SerializeTuple, Self::Error>,
         serialize_tuple_struct(&'static str, usize) -> Result<Self::SerializeTupleStruct, Self::Error>,
         serialize_tuple_variant(&'static str, u32, &'static str, usize) -> Result<Self::SerializeTupleVariant, Self::Error>,
         serialize_map(Option<usize>) -> Result<Self::SerializeMap, Self::Error>,
+    }
+
+    fn serialize_unit_variant(self, _: &'static str, number: u32, name: &'static str) -> Described {
+        Ok(format!("{number} {name}"))
     }
 
     fn serialize_some<T: Serialize + ?Sized>(self, value: &T) -> Described {

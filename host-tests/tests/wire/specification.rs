@@ -1,9 +1,14 @@
 //! `docs/wire.md` is the specification: its examples, tables and constants are checked here against the library.
 
-use super::samples::{largest, typical};
+use std::fmt::Debug;
+
+use super::samples::{largest, largest_requests, requests, typical};
 use super::{frame, hear, schema};
 use toposlam::FaultKind;
-use toposlam::wire::{Encoder, FRAME_VERSION, MAX_FRAME_BYTES, Message, PROTOCOL_VERSION, SCHEMA_HASH};
+use toposlam::wire::{
+    CHUNK_BYTES, Decoder, Encoder, FRAME_VERSION, JourneyState, MAX_FRAME_BYTES, PROTOCOL_VERSION, Payload, Progress,
+    Refusal, Request, ResetCause, SCHEMA_HASH,
+};
 
 const SPECIFICATION: &str = include_str!("../../../docs/wire.md");
 
@@ -20,13 +25,13 @@ struct Example {
 }
 
 /// An example: a line for the sequence number, one for the message and one for the bytes of the frame.
-fn examples() -> Vec<Example> {
+fn examples(kind: &str) -> Vec<Example> {
     let line = |block: &'static str, word: &str| -> &'static str {
         let start = format!("{word}: ");
         block.lines().find_map(|line| line.strip_prefix(start.as_str())).unwrap_or_else(|| panic!("{word} in {block}"))
     };
     let byte = |hex: &str| u8::from_str_radix(hex, 16).unwrap_or_else(|_| panic!("{hex} is no byte"));
-    blocks("example")
+    blocks(kind)
         .into_iter()
         .map(|block| Example {
             sequence: line(block, "sequence").parse().unwrap_or_else(|_| panic!("sequence in {block}")),
@@ -40,20 +45,39 @@ fn hex(bytes: &[u8]) -> String {
     bytes.iter().map(|byte| format!("{byte:02X}")).collect::<Vec<_>>().join(" ")
 }
 
-fn wanted(sequence: u16, message: &Message) -> String {
+fn wanted<M: Payload + Debug>(sequence: u16, message: &M) -> String {
     let frame = frame(&mut Encoder::new(sequence), message);
     format!("sequence: {sequence}\nmessage: {message:?}\nframe: {}\n", hex(&frame))
 }
 
 #[test]
 fn every_example_is_packed_and_read_as_it_says() {
-    for example in examples() {
+    for example in examples("example") {
         let heard = hear(&example.frame);
         let [(header, message)] = heard.messages[..] else { panic!("{} is no message", example.message) };
         assert_eq!(format!("{message:?}"), example.message);
         assert_eq!(header.sequence, example.sequence);
         assert_eq!(hex(&frame(&mut Encoder::new(example.sequence), &message)), hex(&example.frame));
     }
+}
+
+#[test]
+fn every_example_of_a_request_is_packed_and_read_as_it_says() {
+    for example in examples("request") {
+        let mut decoder = Decoder::<Request>::new();
+        let Progress::Message { header, message, rest: [] } = decoder.feed(&example.frame) else {
+            panic!("{} is no request", example.message)
+        };
+        assert_eq!(format!("{message:?}"), example.message);
+        assert_eq!(header.sequence, example.sequence);
+        assert_eq!(hex(&frame(&mut Encoder::new(example.sequence), &message)), hex(&example.frame));
+    }
+}
+
+#[test]
+fn every_command_and_setting_has_its_example() {
+    let wanted: String = requests().iter().zip(0..).map(|(request, sequence)| wanted(sequence, request)).collect();
+    assert_eq!(blocks("request").concat(), wanted);
 }
 
 #[test]
@@ -74,28 +98,61 @@ fn the_specification_states_the_versions_and_the_largest_frame() {
         format!("frame version is {FRAME_VERSION}"),
         format!("protocol version is {PROTOCOL_VERSION}"),
         format!("at most {MAX_FRAME_BYTES} bytes"),
+        format!("first byte is {}", Request::VERSION),
+        format!("at most {CHUNK_BYTES} bytes of a snapshot"),
     ] {
         assert!(SPECIFICATION.contains(&sentence), "{sentence}");
     }
 }
 
 #[test]
-fn the_specification_lists_every_kind_of_fault_with_its_number() {
-    let kinds: Vec<_> = FaultKind::ALL.iter().map(|&kind| format!("{} {kind:?}", kind as u8)).collect();
-    assert!(SPECIFICATION.contains(&(kinds.join(", ") + ";")), "{}", kinds.join(", "));
+fn the_specification_lists_every_kind_that_is_one_byte_with_its_number() {
+    fn listed<T: Debug>(numbered: impl Iterator<Item = (u8, T)>) {
+        let list: Vec<_> = numbered.map(|(number, kind)| format!("{number} {kind:?}")).collect();
+        assert!(SPECIFICATION.contains(&(list.join(", ") + ";")), "{}", list.join(", "));
+    }
+    listed(FaultKind::ALL.iter().map(|&kind| (kind as u8, kind)));
+    listed(ResetCause::ALL.iter().map(|&kind| (kind.into(), kind)));
+    listed(JourneyState::ALL.iter().map(|&kind| (kind.into(), kind)));
+    // Each refusal has a line of its own.
+    for &refusal in Refusal::ALL {
+        assert!(SPECIFICATION.contains(&format!("| {} | {refusal:?} |", u8::from(refusal))), "{refusal:?}");
+    }
 }
 
 #[test]
-fn the_table_of_costs_is_what_the_frames_take() {
-    let costs: String = typical()
-        .iter()
-        .zip(largest())
-        .map(|(typical, largest)| {
-            let name = format!("{typical:?}");
-            let name = name.split([' ', '(']).next().unwrap_or_default();
-            let bytes = |message| frame(&mut Encoder::new(0xFFFF), message).len();
-            format!("| {name} | {} | {} |\n", bytes(typical), bytes(&largest))
-        })
-        .collect();
-    assert!(SPECIFICATION.contains(&costs), "the table is\n{costs}");
+fn a_kind_that_is_not_known_is_read_as_the_first() {
+    for number in 0..=u8::MAX {
+        let known = |kind: u8| if kind == 0 { 0 } else { number };
+        assert_eq!(u8::from(ResetCause::from(number)), known(ResetCause::from(number).into()));
+        assert_eq!(u8::from(Refusal::from(number)), known(Refusal::from(number).into()));
+        assert_eq!(u8::from(JourneyState::from(number)), known(JourneyState::from(number).into()));
+    }
+    assert_eq!(ResetCause::from(u8::MAX), ResetCause::Unknown);
+}
+
+/// The rows of the table of costs: a name, and the length of a typical and of the largest frame.
+fn costs<M: Payload + Debug>(typical: &[M], largest: &[M]) -> String {
+    let name = |message: &M| {
+        let text = format!("{message:?}");
+        let of_kind = |text: &str| text.split([' ', '(']).next().unwrap_or_default().to_owned();
+        match text.split_once("outcome: ").or(text.split_once("command: ")) {
+            Some((before, inner)) if before.starts_with("Reply") => format!("Reply, {}", of_kind(inner)),
+            Some((_, inner)) => of_kind(inner),
+            None => of_kind(&text),
+        }
+    };
+    let bytes = |message: &M| frame(&mut Encoder::new(0xFFFF), message).len();
+    let rows = typical.iter().zip(largest).map(|(typical, largest)| (name(typical), bytes(typical), bytes(largest)));
+    let mut rows: Vec<_> =
+        rows.map(|(name, typical, largest)| format!("| {name} | {typical} | {largest} |\n")).collect();
+    rows.dedup();
+    rows.concat()
+}
+
+#[test]
+fn the_tables_of_costs_are_what_the_frames_take() {
+    for costs in [costs(&typical(), &largest()), costs(&requests(), &largest_requests())] {
+        assert!(SPECIFICATION.contains(&costs), "the table is\n{costs}");
+    }
 }

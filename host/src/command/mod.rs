@@ -1,6 +1,7 @@
 //! The subcommands, a file each: its arguments and what it does with them. `drive` is what two of them share,
 //! `filter` what three of them let choose.
 
+pub(crate) mod console;
 mod drive;
 pub(crate) mod emulate;
 pub(crate) mod evaluate;

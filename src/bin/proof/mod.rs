@@ -18,8 +18,9 @@ use toposlam::{
     ring::{Echo, RingFrame},
     sonar::{BridgeError, Sc18im700, SonarError, SonarRing, Srf08Config, Srf08ConfigError, Srf08Ring},
     wire::{
-        Decoder, EncodeError, Encoder, Hello, HelloError, MAX_FRAME_BYTES, Message, Picture, Progress, QueueFull,
-        Reporter, map_digest,
+        Decoder, EncodeError, Encoder, Hello, HelloError, Inbox, JourneyState, MAX_FRAME_BYTES, Message, Outcome,
+        Payload, Picture, Progress, QueueFull, Refusal, Reply, Reporter, Request, ResetCause, Setting, Settings,
+        Staging, Version, crc32, map_digest,
     },
 };
 
@@ -338,10 +339,14 @@ pub(crate) fn mapper() {
     for _ in 0..black_box(9) {
         black_box(mapper.observe(&any_frame(), any_turn(), &FaultCounters::new().opaque(), any_answer));
     }
+    mapper.hurry();
+    black_box(mapper.reset(&reference::MAPPER.opaque(), any_answer).is_ok());
     black_box((mapper.map(), mapper.filter(), mapper.detector()));
     static REPORTER: ConstStaticCell<Reporter<VERTICES>> = ConstStaticCell::new(Reporter::new());
     let Some(reporter) = REPORTER.try_take() else { return };
     reporter.tick(mapper.map(), &FaultCounters::new().opaque(), any_answer);
+    reporter.hurry();
+    reporter.forget(any_answer);
     black_box((reporter.refused(), map_digest(mapper.map())));
 }
 
@@ -377,7 +382,7 @@ pub(crate) fn wire() {
         black_box(edge);
     }
     black_box((picture.hello(), picture.location(), picture.evidence(), picture.health()));
-    black_box((picture.belief(), picture.worst()));
+    black_box((picture.belief(), picture.worst(), picture.journey()));
     black_box((picture.neighbours(black_box(3)), picture.fault(FaultKind::BusError.opaque())));
     if let Some(Err(error)) = picture.hello().map(|hello: Hello| hello.check()) {
         show::<HelloError>(error);
@@ -386,4 +391,56 @@ pub(crate) fn wire() {
     for echo in echoes.iter() {
         black_box(echo);
     }
+}
+
+pub(crate) fn commands() {
+    static INBOX: ConstStaticCell<Inbox> = ConstStaticCell::new(Inbox::new());
+    static BUFFER: ConstStaticCell<[u8; 300]> = ConstStaticCell::new([0; 300]);
+    static FRAME: ConstStaticCell<[u8; MAX_FRAME_BYTES]> = ConstStaticCell::new([0; MAX_FRAME_BYTES]);
+    let (Some(inbox), Some(buffer), Some(frame)) = (INBOX.try_take(), BUFFER.try_take(), FRAME.try_take()) else {
+        return;
+    };
+    let mut staging = Staging::new(buffer);
+    for _ in 0..black_box(300) {
+        inbox.take(black_box(7));
+    }
+    let reply = inbox.turn(|command| {
+        black_box(*command);
+        let refuse = |refusal: Refusal| {
+            show::<Refusal>(refusal);
+            Outcome::from(refusal)
+        };
+        let taken = staging.take(|bytes| {
+            black_box(&bytes);
+            black_box(Some(200))
+        });
+        black_box(Outcome::from(taken));
+        black_box(staging.piece(black_box(3)).unwrap_or_else(refuse));
+        black_box(staging.begin(black_box(3), black_box(4)).is_ok());
+        let bytes = black_box([1; 64]);
+        black_box(staging.chunk(black_box(1), bytes.get(..black_box(3)).unwrap_or(&[])).is_ok());
+        match staging.commit() {
+            Ok(bytes) => {
+                black_box(bytes);
+                Outcome::Done
+            }
+            Err(refusal) => refuse(refusal),
+        }
+    });
+    if let Some(reply) = reply.map(Reply::opaque) {
+        let message = Message::Reply(reply).opaque();
+        black_box(Encoder::new(black_box(9)).encode(&message, frame).is_ok());
+    }
+    let request = Request { id: black_box(1), command: toposlam::wire::Command::Info.opaque() };
+    black_box(Encoder::new(black_box(9)).encode(&request, frame).is_ok());
+    black_box((request.boot(), inbox.faults(), crc32(black_box(&[1, 2, 3])), Version::LIBRARY));
+    let settings = Settings {
+        filter: RobustConfig::default().opaque(),
+        place: PlaceConfig::default().opaque(),
+        speed_permille: black_box(1000),
+        snapshot_every_places: black_box(10),
+    };
+    black_box(settings.with(Setting::Hypotheses(7).opaque(), black_box(10), black_box(16)).is_ok());
+    show(ResetCause::from(black_box(3)));
+    show(JourneyState::from(black_box(3)));
 }

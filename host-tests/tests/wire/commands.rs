@@ -1,0 +1,137 @@
+//! Requests and replies: every command there and back, snapshots in pieces, and lines that lose either.
+
+use super::console::{Damage, Direction, FakeLine, FakeRobot, TURNS};
+use super::robot::Random;
+use super::samples::{largest_requests, requests};
+use std::cell::RefCell;
+use std::rc::Rc;
+use std::time::Duration;
+use toposlam::wire::{CHUNK_BYTES, Command, Header, Message, Refusal, ResetCause, Setting, Version};
+use toposlam_host::client::{Client, ClientError};
+
+type FakeClient = Client<FakeLine, fn(Header, &Message)>;
+
+/// A client of a fake robot, over a line that damages.
+fn client(damage: Damage) -> (FakeClient, Rc<RefCell<FakeRobot>>) {
+    let line = FakeLine::new(damage);
+    let robot = line.robot();
+    let mut client: FakeClient = Client::new(line, 65_530, |_, _| {});
+    client.timeout = Duration::from_secs(5);
+    (client, robot)
+}
+
+fn good_line() -> Damage {
+    Box::new(|_, bytes| bytes)
+}
+
+#[test]
+fn every_command_reaches_the_robot_as_it_was_given_and_its_outcome_comes_back() {
+    let (mut client, robot) = client(good_line());
+    for sent in [requests(), largest_requests()].concat() {
+        let outcome = client.request(sent.command).unwrap();
+        let robot = robot.borrow();
+        assert_eq!(robot.executed.last(), Some(&sent.command));
+        let mut replies = robot.said.iter().filter_map(|said| match said {
+            Message::Reply(reply) => Some(reply.outcome),
+            _ => None,
+        });
+        assert_eq!(replies.next_back(), Some(outcome));
+    }
+    assert_eq!(robot.borrow().executed.len(), 2 * requests().len(), "each once");
+}
+
+#[test]
+fn what_is_set_is_what_the_robot_says_of_itself() {
+    let (mut client, robot) = client(good_line());
+    client.order(Command::LocaliseOnly { on: true }).unwrap();
+    client.order(Command::Pause { on: true }).unwrap();
+    let info = client.info().unwrap();
+    assert_eq!((info.paused, info.localise_only, info.going_to), (true, true, None));
+    assert_eq!((info.version, info.boot, info.reset_cause), (Version::LIBRARY, 17, ResetCause::BrownOut));
+    client.order(Command::SetConfig(Setting::NoiseMm(77))).unwrap();
+    assert_eq!(robot.borrow().settings.filter.noise_mm, 77);
+    let refused = client.order(Command::SetConfig(Setting::NoiseMm(0)));
+    assert!(matches!(refused, Err(ClientError::Refused(Refusal::OutOfRange))), "{refused:?}");
+    assert_eq!(robot.borrow().settings.filter.noise_mm, 77);
+}
+
+#[test]
+fn the_map_comes_when_it_is_asked_for() {
+    let (mut client, robot) = client(good_line());
+    for _ in 0..TURNS {
+        robot.borrow_mut().turn(&[]);
+    }
+    let vertices = robot.borrow().mapper.map().vertices();
+    assert!(vertices > 4, "{vertices} vertices");
+    let turns = robot.borrow().said.len();
+    let picture = client.map().unwrap();
+    let robot = robot.borrow();
+    assert!(picture.edges().eq(robot.mapper.map().edges()));
+    assert_eq!(picture.vertices(), robot.mapper.map().vertices());
+    assert!(robot.said.len() - turns < usize::from(vertices) + 20, "no more than the picture was sent");
+    assert!(picture.hello().is_some());
+}
+
+#[test]
+fn a_reset_robot_tells_that_every_vertex_is_gone() {
+    let (mut client, robot) = client(good_line());
+    for _ in 0..TURNS {
+        robot.borrow_mut().turn(&[]);
+    }
+    client.map().unwrap();
+    assert!(client.picture().vertices() > 4 && client.picture().location().is_some());
+    client.order(Command::Reset).unwrap();
+    client.info().unwrap();
+    assert_eq!((client.picture().vertices(), client.picture().location()), (0, None));
+    assert_eq!(client.map().unwrap().vertices(), robot.borrow().mapper.map().vertices());
+}
+
+#[test]
+fn snapshots_cross_the_line_whole_both_ways() {
+    let (mut client, robot) = client(good_line());
+    assert_eq!(client.snapshot().unwrap(), [1; 150]);
+    assert_eq!(client.snapshot().unwrap(), [2; 150], "each is taken anew");
+    for length in [1, CHUNK_BYTES - 1, CHUNK_BYTES, CHUNK_BYTES + 1, 300] {
+        let snapshot: Vec<u8> = (0..length).map(|byte| byte as u8).collect();
+        client.restore(&snapshot).unwrap();
+        assert_eq!(robot.borrow().restored, snapshot);
+    }
+    for (bad, refusal) in [(&[0; 301][..], Refusal::TooLong), (&[], Refusal::BadSnapshot)] {
+        let refused = client.restore(bad);
+        assert!(matches!(refused, Err(ClientError::Refused(why)) if why == refusal), "{refused:?}");
+        assert_eq!(robot.borrow().restored.len(), 300, "what is refused changes nothing");
+    }
+}
+
+#[test]
+fn lost_requests_and_lost_replies_are_made_up_for_and_each_command_is_executed_once() {
+    for lost in [Direction::ToRobot, Direction::FromRobot] {
+        let mut random = Random(7);
+        let (mut client, robot) =
+            client(Box::new(
+                move |direction, bytes| {
+                    if direction == lost && random.happens(50) { Vec::new() } else { bytes }
+                },
+            ));
+        client.timeout = Duration::from_millis(20);
+        client.attempts = 100;
+        let snapshot: Vec<u8> = (0..=255).collect();
+        client.restore(&snapshot).unwrap();
+        assert_eq!(robot.borrow().restored, snapshot);
+        assert_eq!(client.snapshot().unwrap(), [1; 150], "taken once, however often asked for");
+        assert_eq!(robot.borrow().executed.len(), 1 + 4 + 1 + 3, "{lost:?}");
+        client.order(Command::Pause { on: true }).unwrap();
+        client.order(Command::Pause { on: true }).unwrap();
+        assert_eq!(robot.borrow().executed.len(), 11, "the same command under another number is another request");
+    }
+}
+
+#[test]
+fn a_robot_that_says_nothing_is_an_error() {
+    let (mut client, _) = client(Box::new(|direction, bytes| match direction {
+        Direction::ToRobot => bytes,
+        Direction::FromRobot => Vec::new(),
+    }));
+    client.timeout = Duration::from_millis(2);
+    assert!(matches!(client.info(), Err(ClientError::NoReply { attempts: 5 })));
+}

@@ -1,0 +1,170 @@
+//! `toposlam command`: tell a robot on a serial line what to do.
+
+use std::path::PathBuf;
+
+use anyhow::Context;
+use clap::{Args, Subcommand, ValueEnum};
+use toposlam::wire::{Command, Header, Info, Message, Picture, Setting};
+use toposlam_host::client::Client;
+use toposlam_host::line::{Line, open};
+
+/// Arguments of `toposlam command`.
+#[derive(Args)]
+pub(crate) struct Arguments {
+    /// The robot's line: a serial port, or tcp:HOST:PORT.
+    line: String,
+    /// The speed of a serial port.
+    #[arg(long, default_value_t = 115_200)]
+    baud: u32,
+    /// Repeat a request after this many milliseconds without a reply.
+    #[arg(long, default_value_t = 1000)]
+    timeout_ms: u64,
+    /// Send a request this often before giving up.
+    #[arg(long, default_value_t = 5)]
+    attempts: u32,
+    #[command(subcommand)]
+    action: Action,
+}
+
+#[derive(Subcommand)]
+enum Action {
+    /// Say which robot this is and what it does.
+    Info,
+    /// Print the map.
+    Map,
+    /// Take a snapshot and write it to a file.
+    Snapshot {
+        /// The file.
+        file: PathBuf,
+    },
+    /// Go on with the map of a snapshot.
+    Restore {
+        /// A file that `snapshot` wrote.
+        file: PathBuf,
+    },
+    /// Forget the map and start anew.
+    Reset,
+    /// Change a setting.
+    Set {
+        /// Which one.
+        name: SettingName,
+        /// Its value.
+        value: u16,
+    },
+    /// Keep the map as it is and only tell where the robot is, or go on mapping.
+    LocaliseOnly {
+        /// Whether the map is kept.
+        state: Switch,
+    },
+    /// Drive to a vertex of the map.
+    GoTo {
+        /// The number of the vertex.
+        vertex: u8,
+    },
+    /// Go on exploring.
+    Explore,
+    /// Stand still, or go on.
+    Pause {
+        /// Whether to stand still.
+        state: Switch,
+    },
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+enum Switch {
+    On,
+    Off,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+enum SettingName {
+    NoiseMm,
+    Hypotheses,
+    Moves,
+    WrongTurnPermille,
+    WrongDegreePermille,
+    EquidistanceMm,
+    LeaveMm,
+    SpeedPermille,
+    SnapshotEveryPlaces,
+}
+
+impl SettingName {
+    fn with(self, value: u16) -> Setting {
+        match self {
+            Self::NoiseMm => Setting::NoiseMm(value),
+            Self::Hypotheses => Setting::Hypotheses(value),
+            Self::Moves => Setting::Moves(value),
+            Self::WrongTurnPermille => Setting::WrongTurnPermille(value),
+            Self::WrongDegreePermille => Setting::WrongDegreePermille(value),
+            Self::EquidistanceMm => Setting::EquidistanceMm(value),
+            Self::LeaveMm => Setting::LeaveMm(value),
+            Self::SpeedPermille => Setting::SpeedPermille(value),
+            Self::SnapshotEveryPlaces => Setting::SnapshotEveryPlaces(value),
+        }
+    }
+}
+
+pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
+    let line = open(&arguments.line, arguments.baud)?;
+    let mut client = Client::new(line, rand::random(), |_, _: &Message| {});
+    client.timeout = std::time::Duration::from_millis(arguments.timeout_ms);
+    client.attempts = arguments.attempts;
+    match &arguments.action {
+        Action::Info => print_info(&client.info()?),
+        Action::Map => print_map(client.map()?),
+        Action::Snapshot { file } => {
+            let snapshot = client.snapshot()?;
+            std::fs::write(file, &snapshot).with_context(|| format!("writing {}", file.display()))?;
+            println!("{} bytes", snapshot.len());
+        }
+        Action::Restore { file } => {
+            let snapshot = std::fs::read(file).with_context(|| format!("reading {}", file.display()))?;
+            client.restore(&snapshot)?;
+            println!("{} bytes restored", snapshot.len());
+        }
+        Action::Reset => order(&mut client, Command::Reset)?,
+        Action::Set { name, value } => order(&mut client, Command::SetConfig(name.with(*value)))?,
+        Action::LocaliseOnly { state } => {
+            order(&mut client, Command::LocaliseOnly { on: *state == Switch::On })?;
+        }
+        Action::GoTo { vertex } => order(&mut client, Command::GoTo { vertex: *vertex })?,
+        Action::Explore => order(&mut client, Command::Explore)?,
+        Action::Pause { state } => order(&mut client, Command::Pause { on: *state == Switch::On })?,
+    }
+    Ok(())
+}
+
+fn order(client: &mut Client<Box<dyn Line>, impl FnMut(Header, &Message)>, command: Command) -> anyhow::Result<()> {
+    client.order(command)?;
+    println!("done");
+    Ok(())
+}
+
+fn print_info(info: &Info) {
+    let version = info.version;
+    println!("toposlam {}.{}.{}", version.major, version.minor, version.patch);
+    println!("start {}: {}", info.boot, info.reset_cause);
+    println!("up for {:.1} s", f64::from(info.uptime_ms) / 1000.0);
+    let mapping = if info.localise_only { "keeps the map and localises" } else { "maps" };
+    println!("{}{mapping}", if info.paused { "paused; otherwise it " } else { "" });
+    if let Some(vertex) = info.going_to {
+        println!("on the way to vertex {vertex}");
+    }
+    match info.stored_bytes {
+        0 => println!("no snapshot stored"),
+        bytes => println!("snapshot of {bytes} bytes stored {} places ago", info.stored_places_ago),
+    }
+}
+
+fn print_map(picture: &Picture<64>) {
+    println!("map: {} vertices, {} edges", picture.vertices(), picture.edges().count());
+    for row in (0..picture.vertices()).filter_map(|vertex| picture.row(vertex)) {
+        println!("  vertex {:2}: radius {:4} mm, {} visits", row.vertex, row.radius_mm, row.visits);
+    }
+    let edges: Vec<String> = picture.edges().map(|(a, b)| format!("{a}-{b}")).collect();
+    println!("  edges: {}", edges.join(" "));
+    if let Some(location) = picture.location() {
+        println!("  at vertex {}", location.vertex);
+    }
+}

@@ -1,0 +1,34 @@
+//! The line to a robot: a serial port of this computer, or a TCP connection to one elsewhere.
+
+use std::{
+    io::{Read, Write},
+    net::TcpStream,
+    time::Duration,
+};
+
+use anyhow::Context;
+
+/// A read gives up after this long when nothing comes.
+const READ_TIMEOUT: Duration = Duration::from_millis(20);
+const WRITE_TIMEOUT: Duration = Duration::from_secs(5);
+
+/// A line to a robot.
+pub trait Line: Read + Write {}
+
+impl<LINE: Read + Write> Line for LINE {}
+
+/// Opens a line by its name: `tcp:HOST:PORT`, or a serial port with a speed in baud (8N1).
+///
+/// # Errors
+/// When the port does not exist or cannot be opened, or nobody answers the connection.
+pub fn open(name: &str, baud: u32) -> anyhow::Result<Box<dyn Line>> {
+    if let Some(address) = name.strip_prefix("tcp:") {
+        let line = TcpStream::connect(address).with_context(|| format!("connecting to {address}"))?;
+        line.set_nodelay(true)?;
+        line.set_read_timeout(Some(READ_TIMEOUT))?;
+        line.set_write_timeout(Some(WRITE_TIMEOUT))?;
+        return Ok(Box::new(line));
+    }
+    let port = serialport::new(name, baud).timeout(READ_TIMEOUT).open();
+    Ok(Box::new(port.with_context(|| format!("opening the serial port {name}"))?))
+}

@@ -1,0 +1,107 @@
+//! The robot's end of the line: bytes in, at most one command in each turn of the main loop.
+
+use super::decoder::Progress;
+use super::{Command, Decoder, Outcome, Reply, Request};
+use crate::{FaultCounters, FaultKind};
+
+/// Takes whatever comes on the robot's receive line, and hands on at most one command in each turn of the main loop.
+///
+/// However much comes, the work is bounded: [`Inbox::take`] costs a constant amount for a byte on the average (a closing
+/// zero costs the CRC of the bytes before it), and in each turn only [`Inbox::BYTES_PER_TURN`] bytes are looked at; the rest is
+/// thrown away. One request waits for its turn. Bytes that are no request are counted as `WireCorrupt`, requests
+/// for which there is no room and bytes beyond those of a turn as `CommandFlood`.
+///
+/// A request that comes again, because its reply was lost, gets the same reply and is not executed again.
+/// Memory: about 450 bytes.
+///
+/// ```
+/// use toposlam::wire::{Command, Encoder, Inbox, MAX_FRAME_BYTES, Outcome, Reply, Request};
+///
+/// let mut buffer = [0; MAX_FRAME_BYTES];
+/// let request = Request { id: 7, command: Command::Pause { on: true } };
+/// let bytes = Encoder::new(0).encode(&request, &mut buffer)?;
+///
+/// let mut inbox = Inbox::new();
+/// let mut paused = false;
+/// for _ in 0..2 {
+///     bytes.iter().for_each(|&byte| inbox.take(byte));
+///     let reply = inbox.turn(|command| {
+///         assert_eq!(*command, Command::Pause { on: true });
+///         assert!(!paused, "it is executed once");
+///         paused = true;
+///         Outcome::Done
+///     });
+///     assert_eq!(reply, Some(Reply { request: 7, outcome: Outcome::Done }));
+/// }
+/// # Ok::<(), toposlam::wire::EncodeError>(())
+/// ```
+#[derive(Clone, Debug)]
+pub struct Inbox {
+    decoder: Decoder<Request>,
+    waiting: Option<Request>,
+    /// The request that was executed last, and the reply to it.
+    answered: Option<(Request, Outcome)>,
+    taken: u16,
+    faults: FaultCounters,
+}
+
+impl Inbox {
+    /// How many bytes are looked at in one turn: room for two of the longest frames and some noise.
+    pub const BYTES_PER_TURN: u16 = 256;
+
+    /// An inbox that has received nothing.
+    pub const fn new() -> Self {
+        Self { decoder: Decoder::new(), waiting: None, answered: None, taken: 0, faults: FaultCounters::new() }
+    }
+
+    /// Takes a byte of the line.
+    pub fn take(&mut self, byte: u8) {
+        if self.taken >= Self::BYTES_PER_TURN {
+            if self.taken == Self::BYTES_PER_TURN {
+                self.taken = self.taken.saturating_add(1);
+                self.faults.count(FaultKind::CommandFlood);
+            }
+            return;
+        }
+        self.taken = self.taken.saturating_add(1);
+        match self.decoder.feed(&[byte]) {
+            Progress::NeedsMore => {}
+            Progress::Error { .. } => self.faults.count(FaultKind::WireCorrupt),
+            Progress::Message { message: request, .. } => match self.waiting {
+                None => self.waiting = Some(request),
+                Some(waiting) if waiting == request => {}
+                Some(_) => self.faults.count(FaultKind::CommandFlood),
+            },
+        }
+    }
+
+    /// Once in each turn of the main loop: executes the command that waits, unless it is the last one again, and gives the
+    /// reply to be sent. Bytes are taken again from here on.
+    pub fn turn(&mut self, execute: impl FnOnce(&Command) -> Outcome) -> Option<Reply> {
+        self.taken = 0;
+        let request = self.waiting.take()?;
+        let outcome = match self.answered {
+            Some((answered, outcome)) if answered == request => outcome,
+            _ => {
+                let outcome = execute(&request.command);
+                if matches!(outcome, Outcome::Refused(_)) {
+                    self.faults.count(FaultKind::CommandRefused);
+                }
+                self.answered = Some((request, outcome));
+                outcome
+            }
+        };
+        Some(Reply { request: request.id, outcome })
+    }
+
+    /// What was wrong with what came.
+    pub const fn faults(&self) -> &FaultCounters {
+        &self.faults
+    }
+}
+
+impl Default for Inbox {
+    fn default() -> Self {
+        Self::new()
+    }
+}

@@ -1,0 +1,111 @@
+//! What can be set while the robot runs.
+
+use serde::{Deserialize, Serialize};
+
+use super::Refusal;
+use crate::RobustConfig;
+use crate::place::PlaceConfig;
+
+/// One setting and its value. Append-only; every value is a `u16`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[non_exhaustive]
+pub enum Setting {
+    /// [`RobustConfig::noise_mm`].
+    NoiseMm(u16),
+    /// [`RobustConfig::hypotheses`].
+    Hypotheses(u16),
+    /// [`RobustConfig::moves`].
+    Moves(u16),
+    /// [`RobustConfig::wrong_turn_permille`].
+    WrongTurnPermille(u16),
+    /// [`RobustConfig::wrong_degree_permille`].
+    WrongDegreePermille(u16),
+    /// [`PlaceConfig::equidistance_mm`].
+    EquidistanceMm(u16),
+    /// [`PlaceConfig::leave_mm`].
+    LeaveMm(u16),
+    /// [`Settings::speed_permille`].
+    SpeedPermille(u16),
+    /// [`Settings::snapshot_every_places`].
+    SnapshotEveryPlaces(u16),
+}
+
+/// Everything that can be set while the robot runs, as it is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Settings {
+    /// The filter's settings.
+    pub filter: RobustConfig,
+    /// The place detector's settings.
+    pub place: PlaceConfig,
+    /// How fast to drive, in thousandths of the drive's full speed, 1 to 1000.
+    pub speed_permille: u16,
+    /// After how many places a snapshot is kept that outlasts a loss of power; 0: only when told.
+    pub snapshot_every_places: u16,
+}
+
+impl Settings {
+    /// The settings with one changed, for a robot with room for so many hypotheses and with so many sonars.
+    ///
+    /// # Errors
+    /// [`Refusal::OutOfRange`] when the stage that it belongs to would not start with it.
+    pub fn with(mut self, setting: Setting, hypotheses: usize, sonars: usize) -> Result<Self, Refusal> {
+        let byte = |value: u16| u8::try_from(value).map_err(|_| Refusal::OutOfRange);
+        match setting {
+            Setting::NoiseMm(value) => self.filter.noise_mm = value,
+            Setting::Hypotheses(value) => self.filter.hypotheses = byte(value)?,
+            Setting::Moves(value) => self.filter.moves = byte(value)?,
+            Setting::WrongTurnPermille(value) => self.filter.wrong_turn_permille = value,
+            Setting::WrongDegreePermille(value) => self.filter.wrong_degree_permille = value,
+            Setting::EquidistanceMm(value) => self.place.equidistance_mm = value,
+            Setting::LeaveMm(value) => self.place.leave_mm = value,
+            Setting::SpeedPermille(value) => self.speed_permille = value,
+            Setting::SnapshotEveryPlaces(value) => self.snapshot_every_places = value,
+        }
+        let is_sound = self.filter.check(hypotheses).is_ok()
+            && self.place.check(sonars).is_ok()
+            && (1..=1000).contains(&self.speed_permille);
+        if is_sound { Ok(self) } else { Err(Refusal::OutOfRange) }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const SETTINGS: Settings = Settings {
+        filter: RobustConfig::DEFAULT,
+        place: PlaceConfig::DEFAULT,
+        speed_permille: 1000,
+        snapshot_every_places: 10,
+    };
+
+    #[test]
+    fn every_setting_takes_its_range_and_nothing_beyond() {
+        type Make = fn(u16) -> Setting;
+        type Of = fn(&Settings) -> u16;
+        let settings: [(Make, Of, u16, u16); 9] = [
+            (Setting::NoiseMm, |s| s.filter.noise_mm, 1, 1000),
+            (Setting::Hypotheses, |s| s.filter.hypotheses.into(), 1, 7),
+            (Setting::Moves, |s| s.filter.moves.into(), 0, 255),
+            (Setting::WrongTurnPermille, |s| s.filter.wrong_turn_permille, 1, 500),
+            (Setting::WrongDegreePermille, |s| s.filter.wrong_degree_permille, 1, 500),
+            (Setting::EquidistanceMm, |s| s.place.equidistance_mm, 1, 300),
+            (Setting::LeaveMm, |s| s.place.leave_mm, 150, u16::MAX),
+            (Setting::SpeedPermille, |s| s.speed_permille, 1, 1000),
+            (Setting::SnapshotEveryPlaces, |s| s.snapshot_every_places, 0, u16::MAX),
+        ];
+        let seven = SETTINGS.with(Setting::Hypotheses(7), 7, 16).unwrap();
+        for (setting, value_of, least, most) in settings {
+            for value in [least, most] {
+                let changed = seven.with(setting(value), 7, 16).unwrap();
+                assert_eq!(value_of(&changed), value);
+                let before = value_of(&seven);
+                assert_eq!(changed.with(setting(before), 7, 16), Ok(seven), "nothing else is changed");
+            }
+            let beyond = [least.checked_sub(1), most.checked_add(1)].into_iter().flatten();
+            for value in beyond {
+                assert_eq!(seven.with(setting(value), 7, 16), Err(Refusal::OutOfRange), "{:?}", setting(value));
+            }
+        }
+    }
+}
