@@ -149,7 +149,8 @@ impl fmt::Display for HcSr04ConfigError {
 
 impl core::error::Error for HcSr04ConfigError {}
 
-/// A ring of `SONARS` HC-SR04 on pins of their own.
+/// A ring of `SONARS` HC-SR04 on pins of their own. The sensors of a group may share a trigger line; each then has a handle
+/// to the same pin.
 ///
 /// The sensors of a group are triggered together and timed side by side in one loop, so a frame takes `cycle_ms` for each
 /// firing group, whatever the sensors do. A range is as exact as a turn of that loop is short: a look at the clock and at
