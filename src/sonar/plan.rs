@@ -53,12 +53,12 @@ impl<const SONARS: usize> FiringPlan<SONARS> {
     /// The numbers of the groups, in the order in which they fire.
     pub(super) fn groups(&self) -> impl Iterator<Item = u8> + use<SONARS> {
         let group_of = self.group_of;
-        (0..=u8::MAX).filter(move |group| group_of.contains(group))
+        (0..=u8::MAX).filter(move |&group| group_of.iter().any(|&of| of == group))
     }
 
     /// Whether all sensors fire at once.
     pub(super) fn is_together(&self) -> bool {
-        self.group_count() <= 1
+        self.group_of.windows(2).all(|pair| pair.first() == pair.last())
     }
 }
 
