@@ -53,7 +53,7 @@ impl<const SONARS: usize> FiringPlan<SONARS> {
     /// The numbers of the groups, in the order in which they fire.
     pub(super) fn groups(&self) -> impl Iterator<Item = u8> + use<SONARS> {
         let group_of = self.group_of;
-        (0..=u8::MAX).filter(move |&group| group_of.iter().any(|&of| of == group))
+        (0..=u8::MAX).filter(move |group| group_of.contains(group))
     }
 
     /// Whether all sensors fire at once.

@@ -164,7 +164,7 @@ fn i2c_rings(mut bus: impl I2c) {
     match Srf08Ring::<_, _, 16>::new(&mut bus, AnyDelay, Srf08Config { plan: any_plan(), ..config }.opaque()) {
         Ok(mut ring) => {
             read(&mut ring);
-            black_box(ring.release().1.delay_ms(1));
+            ring.release().1.delay_ms(1);
         }
         Err(error) => show::<Srf08ConfigError>(error),
     }
@@ -181,7 +181,7 @@ fn pin_ring() {
     match HcSr04Ring::<_, _, _, _, 16>::new(pins, AnyClock, AnyDelay, config.opaque()) {
         Ok(mut ring) => {
             read(&mut ring);
-            black_box(ring.release().2.delay_ms(1));
+            ring.release().2.delay_ms(1);
         }
         Err(error) => show::<HcSr04ConfigError>(error),
     }
