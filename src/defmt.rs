@@ -6,7 +6,9 @@ use defmt::{Format, Formatter, write};
 
 use crate::place::{Place, PlaceConfigError};
 use crate::ring::Echo;
-use crate::sonar::{BridgeError, SonarError, SonarFault, Srf08ConfigError};
+use crate::sonar::{
+    AddressError, BridgeError, HcSr04ConfigError, MaxBotixConfigError, SonarError, SonarFault, Srf08ConfigError,
+};
 use crate::{
     ConfigError, FaultCounters, FaultKind, Fingerprint, FingerprintError, NgramError, NgramsFull, Observation, Turn,
     Update, VerticesFull, WeightFactors, WorstNgram,
@@ -63,7 +65,18 @@ texts!(PlaceConfigError {
 texts!(SonarFault {
     Silent => "did not answer in time",
     Nonsense => "answered with an impossible range",
-    Bus => "could not be reached: bus error",
+    Bus => "could not be reached: bus or pin error",
+    Stuck => "holds its line high before it is asked",
+    Clock => "could not be timed: the clock stands still",
+});
+
+texts!(AddressError {
+    From => "from is out of its range",
+    To => "to is out of its range",
+    Taken => "a device answers at the wanted address already",
+    Silent => "no sensor acknowledged the present address",
+    Bus => "bus error",
+    Unchanged => "nothing answers at the wanted address afterwards",
 });
 
 texts!(BridgeError {
@@ -77,9 +90,21 @@ texts!(BridgeError {
     BaudRate => "no divider for this line speed",
 });
 
+texts!(HcSr04ConfigError {
+    Trigger => "trigger_us is out of its range",
+    Timeout => "rise_timeout_us or echo_timeout_us is out of its range",
+    StandstillPolls => "standstill_polls is out of its range",
+    SpeedOfSound => "speed_of_sound_m_per_s is out of its range",
+    Range => "min_range_mm is above max_range_mm",
+});
+
+texts!(MaxBotixConfigError {
+    FirstAddress => "first_address is out of its range",
+    Ranging => "ranging_ms is out of its range",
+});
+
 texts!(Srf08ConfigError {
     FirstAddress => "first_address is out of its range",
-    FiringGroups => "firing_groups is out of its range",
     Timeout => "timeout_ms is out of its range",
     PollInterval => "poll_interval_us is out of its range",
     SpeedOfSound => "speed_of_sound_m_per_s is out of its range",

@@ -34,11 +34,19 @@ impl Echo {
 /// frame.echoes[5] = Echo::Dead;
 /// let nearest_mm = frame.echoes.iter().filter_map(|echo| echo.range_mm()).min();
 /// assert_eq!(nearest_mm, Some(1200));
+/// assert!(frame.dead_sensors().eq([5]));
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct RingFrame<const SONARS: usize> {
     /// One echo for each sensor.
     pub echoes: [Echo; SONARS],
+}
+
+impl<const SONARS: usize> RingFrame<SONARS> {
+    /// The indices of the sensors that say nothing about the world in this frame, in ascending order.
+    pub fn dead_sensors(&self) -> impl Iterator<Item = usize> {
+        self.echoes.iter().enumerate().filter_map(|(sensor, echo)| (*echo == Echo::Dead).then_some(sensor))
+    }
 }
 
 /// Where the sensors of a ring look, counter-clockwise from straight ahead.

@@ -5,26 +5,7 @@
 
 use std::mem;
 
-/// What a device on the bus says to a transfer.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub enum BusAnswer<DATA> {
-    /// It took or gave the data.
-    Acknowledged(DATA),
-    /// No device has that address, or it keeps silent.
-    AddressNotAcknowledged,
-    /// The device refused a byte.
-    DataNotAcknowledged,
-    /// The bus is stuck.
-    TimedOut,
-}
-
-/// The devices behind the bridge.
-pub trait I2cDevices {
-    /// A write to a 7-bit address.
-    fn write(&mut self, address: u8, bytes: &[u8]) -> BusAnswer<()>;
-    /// A read of some bytes from a 7-bit address.
-    fn read(&mut self, address: u8, count: usize) -> BusAnswer<Vec<u8>>;
-}
+use super::{BusAnswer, I2cDevices};
 
 /// The chip, with the devices on its bus.
 #[derive(Debug)]

@@ -1,65 +1,50 @@
-//! A model of sixteen SRF08 rangers that stand in a world of ring frames.
+//! A model of sixteen SRF08 or SRF10 rangers that stand in a world of ring frames.
 
 use toposlam::ring::{Echo, RingFrame};
 
-use super::{BusAnswer, I2cDevices};
+use super::{
+    BusAnswer, I2cDevices, SensorFault,
+    surroundings::{Surroundings, flight_us},
+};
 
 const SENSORS: usize = 16;
 const FIRST_ADDRESS: u8 = 0x70;
-const REGISTERS: usize = 36;
 const REVISION: u8 = 6;
+/// What comes before a new address.
+const UNLOCKING: [u8; 3] = [0xA0, 0xAA, 0xA5];
 
-/// A defect that a test gives a sensor.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum SensorFault {
-    /// It does not acknowledge its address.
-    Absent,
-    /// It acknowledges and ranges for ever.
-    NeverDone,
-    /// It answers 0: no echo, whatever is there.
-    Zeros,
-    /// It answers 65,535.
-    Nonsense,
-    /// It refuses the data that is written to it.
-    RefusesData,
-    /// It blocks the bus whenever it is read.
-    BlocksBus,
-}
-
-/// Sixteen rangers at 0x70 to 0x7F. The world is a source of ring frames: a new frame begins when a ranger fires that
-/// has fired in the present one already.
+/// Sixteen rangers, at 0x70 to 0x7F at first. The world is a source of ring frames: a new frame begins when a ranger fires
+/// that has fired in the present one already.
+#[derive(Debug)]
 pub struct Srf08Bank<WORLD> {
-    world: WORLD,
+    surroundings: Surroundings<WORLD, SENSORS>,
     /// How often a ranging sensor is asked before it is done.
     ranging_polls: u32,
-    frame: Option<RingFrame<SENSORS>>,
-    frames: u64,
-    blind_frames: u64,
-    fired: u16,
+    is_srf10: bool,
     sensors: [Sensor; SENSORS],
 }
 
-#[derive(Clone, Copy, Default)]
+#[derive(Clone, Copy, Debug, Default)]
 struct Sensor {
     fault: Option<SensorFault>,
+    address: u8,
+    /// How many commands of [`UNLOCKING`] it has seen in a row.
+    unlocked: usize,
     /// How often it still reads as ranging.
     polls_left: u32,
     pointer: usize,
-    echo: u16,
 }
 
 impl<WORLD: FnMut() -> Option<RingFrame<SENSORS>>> Srf08Bank<WORLD> {
-    /// Rangers in a world. `ranging_polls` stands for the 65 ms of a ranging: so often a sensor reads as still ranging.
+    /// SRF08 in a world. `ranging_polls` stands for the 65 ms of a ranging: so often a sensor reads as still ranging.
     pub fn new(world: WORLD, ranging_polls: u32) -> Self {
-        Self {
-            world,
-            ranging_polls,
-            frame: None,
-            frames: 0,
-            blind_frames: 0,
-            fired: u16::MAX,
-            sensors: [Sensor::default(); SENSORS],
-        }
+        let sensors = std::array::from_fn(|index| Sensor { address: FIRST_ADDRESS + index as u8, ..Sensor::default() });
+        Self { surroundings: Surroundings::new(world), ranging_polls, is_srf10: false, sensors }
+    }
+
+    /// The same with SRF10: four registers, silent on the bus while they range, deaf to the general call.
+    pub fn srf10(world: WORLD, ranging_polls: u32) -> Self {
+        Self { is_srf10: true, ..Self::new(world, ranging_polls) }
     }
 
     /// Gives a sensor a defect, or heals it.
@@ -67,68 +52,84 @@ impl<WORLD: FnMut() -> Option<RingFrame<SENSORS>>> Srf08Bank<WORLD> {
         self.sensors[sensor].fault = fault;
     }
 
+    /// Whether neighbours that range at the same time hear each other: then both report the shorter range.
+    pub fn set_cross_talk(&mut self, cross_talk: bool) {
+        self.surroundings.cross_talk = cross_talk;
+    }
+
+    /// The 7-bit address of a sensor.
+    pub fn address(&self, sensor: usize) -> u8 {
+        self.sensors[sensor].address
+    }
+
+    /// Puts a sensor at another 7-bit address, as if it came from elsewhere.
+    pub fn set_address(&mut self, sensor: usize, address: u8) {
+        self.sensors[sensor].address = address;
+    }
+
     /// How many frames the world has given so far.
     pub fn frames(&self) -> u64 {
-        self.frames
+        self.surroundings.frames
     }
 
     /// How often the ring was fired after the world had no more frames; every sensor is absent then.
     pub fn blind_frames(&self) -> u64 {
-        self.blind_frames
+        self.surroundings.blind_frames
     }
 
-    fn is_over(&self) -> bool {
-        self.blind_frames > 0
-    }
-
-    fn fire(&mut self, which: u16) {
-        if self.fired & which != 0 {
-            self.fired = 0;
-            self.frame = (self.world)();
-            match self.frame {
-                Some(_) => self.frames += 1,
-                None => self.blind_frames += 1,
-            }
-        }
-        self.fired |= which;
-        for (index, sensor) in self.sensors.iter_mut().enumerate().filter(|(index, _)| which >> index & 1 == 1) {
+    fn fire(&mut self, who: impl Fn(usize) -> bool) {
+        let who = std::array::from_fn(who);
+        self.surroundings.fire(who, self.sensors.map(|sensor| sensor.polls_left > 0));
+        for (sensor, _) in self.sensors.iter_mut().zip(who).filter(|(_, fires)| *fires) {
             sensor.polls_left = self.ranging_polls;
-            sensor.echo = match self.frame.map(|frame| frame.echoes[index]) {
-                Some(Echo::Range { range_mm }) => flight_us(range_mm),
-                Some(Echo::Silence | Echo::Dead) | None => 0,
-            };
         }
     }
 
     fn is_absent(&self, index: usize) -> bool {
-        self.sensors[index].fault == Some(SensorFault::Absent)
-            || self.frame.is_some_and(|frame| frame.echoes[index] == Echo::Dead)
-            || self.is_over()
+        self.sensors[index].fault == Some(SensorFault::Absent) || self.surroundings.is_dead(index)
+    }
+
+    /// The sensor with an address; of several, one that is there.
+    fn index_of(&self, address: u8) -> Option<usize> {
+        let mut with_address = (0..SENSORS).filter(|&index| self.sensors[index].address == address);
+        let first = with_address.clone().next();
+        with_address.find(|&index| !self.is_absent(index)).or(first)
     }
 }
 
-/// The time of flight there and back at 343 m/s, rounded to the sensor's microsecond.
-fn flight_us(range_mm: u16) -> u16 {
-    u16::try_from((u32::from(range_mm) * 2000 + 343 / 2) / 343).unwrap_or(u16::MAX)
-}
-
-fn index_of(address: u8) -> Option<usize> {
-    address.checked_sub(FIRST_ADDRESS).map(usize::from).filter(|&index| index < SENSORS)
+impl Sensor {
+    fn command(&mut self, command: u8) {
+        self.unlocked = match UNLOCKING.get(self.unlocked) {
+            None => {
+                if command.is_multiple_of(2) && command >= FIRST_ADDRESS << 1 {
+                    self.address = command >> 1;
+                }
+                0
+            }
+            Some(&next) if command == next => self.unlocked + 1,
+            Some(_) => usize::from(command == UNLOCKING[0]),
+        };
+    }
 }
 
 impl<WORLD: FnMut() -> Option<RingFrame<SENSORS>>> I2cDevices for Srf08Bank<WORLD> {
     fn write(&mut self, address: u8, bytes: &[u8]) -> BusAnswer<()> {
         let is_ranging = matches!(bytes, [0, 0x50..=0x52]);
-        if address == 0 {
+        if address == 0 && !self.is_srf10 {
             if is_ranging {
-                self.fire(u16::MAX);
+                self.fire(|_| true);
             }
-            return if self.is_over() { BusAnswer::AddressNotAcknowledged } else { BusAnswer::Acknowledged(()) };
+            let is_over = self.surroundings.is_over();
+            return if is_over { BusAnswer::AddressNotAcknowledged } else { BusAnswer::Acknowledged(()) };
         }
-        let Some(index) = index_of(address) else { return BusAnswer::AddressNotAcknowledged };
+        let Some(index) = self.index_of(address) else { return BusAnswer::AddressNotAcknowledged };
+        if self.is_srf10 && self.sensors[index].polls_left > 0 {
+            self.sensors[index].polls_left -= 1;
+            return BusAnswer::AddressNotAcknowledged;
+        }
         if is_ranging {
             // The sound starts with the frame whether or not this sensor takes part in it.
-            self.fire(1 << index);
+            self.fire(|sensor| sensor == index);
         }
         if self.is_absent(index) {
             return BusAnswer::AddressNotAcknowledged;
@@ -137,6 +138,9 @@ impl<WORLD: FnMut() -> Option<RingFrame<SENSORS>>> I2cDevices for Srf08Bank<WORL
         if sensor.fault == Some(SensorFault::RefusesData) {
             return BusAnswer::DataNotAcknowledged;
         }
+        if let [0, command] = *bytes {
+            sensor.command(command);
+        }
         if let Some(&register) = bytes.first() {
             sensor.pointer = register.into();
         }
@@ -144,7 +148,7 @@ impl<WORLD: FnMut() -> Option<RingFrame<SENSORS>>> I2cDevices for Srf08Bank<WORL
     }
 
     fn read(&mut self, address: u8, count: usize) -> BusAnswer<Vec<u8>> {
-        let Some(index) = index_of(address).filter(|&index| !self.is_absent(index)) else {
+        let Some(index) = self.index_of(address).filter(|&index| !self.is_absent(index)) else {
             return BusAnswer::AddressNotAcknowledged;
         };
         let sensor = &mut self.sensors[index];
@@ -153,16 +157,26 @@ impl<WORLD: FnMut() -> Option<RingFrame<SENSORS>>> I2cDevices for Srf08Bank<WORL
         }
         if sensor.polls_left > 0 || sensor.fault == Some(SensorFault::NeverDone) {
             sensor.polls_left = sensor.polls_left.saturating_sub(1);
-            return BusAnswer::Acknowledged(vec![0xFF; count]);
+            let keeps_silent = self.is_srf10;
+            return if keeps_silent {
+                BusAnswer::AddressNotAcknowledged
+            } else {
+                BusAnswer::Acknowledged(vec![0xFF; count])
+            };
         }
-        let [high, low] = match sensor.fault {
-            Some(SensorFault::Zeros) => 0,
-            Some(SensorFault::Nonsense) => u16::MAX,
-            _ => sensor.echo,
-        }
-        .to_be_bytes();
-        let mut registers = [0; REGISTERS];
-        registers[..4].copy_from_slice(&[REVISION, 0, high, low]);
+        let echo_us = match (sensor.fault, self.surroundings.heard(index)) {
+            (Some(SensorFault::Zeros), _) => 0,
+            (Some(SensorFault::Nonsense), _) => u16::MAX,
+            (_, Echo::Range { range_mm }) => u16::try_from(flight_us(range_mm)).unwrap_or(u16::MAX),
+            (_, Echo::Silence | Echo::Dead) => 0,
+        };
+        let [high, low] = echo_us.to_be_bytes();
+        // Only the first of the SRF08's seventeen echoes is ever there.
+        let registers = if self.is_srf10 {
+            vec![REVISION, 0x80, high, low]
+        } else {
+            [&[REVISION, 0, high, low][..], &[0; 32]].concat()
+        };
         let read = registers.into_iter().chain(std::iter::repeat(0xFF)).skip(sensor.pointer).take(count);
         BusAnswer::Acknowledged(read.collect())
     }

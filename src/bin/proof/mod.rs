@@ -1,12 +1,12 @@
 //! Calls of every public function of the library, by module.
 
+mod sonar;
+
 use core::{
     fmt::{self, Write},
     hint::black_box,
 };
 
-use embedded_hal::{delay::DelayNs, i2c::Error as _, i2c::I2c};
-use embedded_hal_nb::{nb, serial};
 use static_cell::ConstStaticCell;
 use toposlam::{
     Config, ConfigError, Consistency, Direction, FaultCounters, FaultKind, Fingerprint, FingerprintError, History, Map,
@@ -14,15 +14,15 @@ use toposlam::{
     RobustFilter, Turn, VerticesFull,
     place::{PlaceConfig, PlaceConfigError, PlaceDetector},
     reference,
-    ring::RingGeometry,
-    ring::{Echo, RingFrame},
-    sonar::{BridgeError, Sc18im700, SonarError, SonarRing, Srf08Config, Srf08ConfigError, Srf08Ring},
+    ring::{Echo, RingFrame, RingGeometry},
     wire::{
         Decoder, EncodeError, Encoder, Hello, HelloError, Inbox, JourneyState, MAX_FRAME_BYTES, Message, Outcome,
         Payload, Picture, Progress, QueueFull, Refusal, Reply, Reporter, Request, ResetCause, Setting, Settings,
         Staging, Version, crc32, map_digest,
     },
 };
+
+pub(crate) use sonar::sonar;
 
 const PARTICLES: usize = 10;
 const VERTICES: usize = 16;
@@ -65,93 +65,7 @@ pub(crate) fn fault() {
 
 pub(crate) fn ring() {
     black_box(Echo::Silence.opaque().range_mm());
-}
-
-struct AnyLine;
-
-#[derive(Debug, Clone, Copy)]
-struct LineError;
-
-impl serial::Error for LineError {
-    fn kind(&self) -> serial::ErrorKind {
-        serial::ErrorKind::Other
-    }
-}
-
-impl serial::ErrorType for AnyLine {
-    type Error = LineError;
-}
-
-fn any_outcome<T>(value: T) -> nb::Result<T, LineError> {
-    match black_box(0_u8) {
-        0 => Ok(value),
-        1 => Err(nb::Error::WouldBlock),
-        _ => Err(nb::Error::Other(LineError)),
-    }
-}
-
-impl serial::Read<u8> for AnyLine {
-    fn read(&mut self) -> nb::Result<u8, LineError> {
-        any_outcome(black_box(0))
-    }
-}
-
-impl serial::Write<u8> for AnyLine {
-    fn write(&mut self, byte: u8) -> nb::Result<(), LineError> {
-        black_box(byte);
-        any_outcome(())
-    }
-
-    fn flush(&mut self) -> nb::Result<(), LineError> {
-        any_outcome(())
-    }
-}
-
-struct AnyDelay;
-
-impl DelayNs for AnyDelay {
-    fn delay_ns(&mut self, nanoseconds: u32) {
-        black_box(nanoseconds);
-    }
-}
-
-pub(crate) fn sonar() {
-    let mut bridge = Sc18im700::new(AnyLine, black_box(100));
-    let report = |outcome: Result<(), BridgeError>| {
-        if let Err(error) = outcome {
-            black_box(error.kind());
-            show(error);
-        }
-    };
-    report(bridge.start());
-    report(bridge.set_baud_rate(black_box(9600)));
-    static READ: ConstStaticCell<[u8; 40]> = ConstStaticCell::new([0; 40]);
-    if let Some(read) = READ.try_take().and_then(|read| read.get_mut(..black_box(3))) {
-        report(bridge.read(black_box(1), read));
-        report(bridge.write_read(black_box(1), black_box(&[1, 2, 3]), read));
-        let written = black_box([5; 20]);
-        report(bridge.write(black_box(1), &written));
-        use embedded_hal::i2c::Operation::{Read, Write};
-        let mut operations = [Write(&written), Read(read), Write(&written)];
-        if let Some(operations) = operations.get_mut(..black_box(2)) {
-            report(bridge.transaction(black_box(1), operations));
-        }
-    }
-    let bridge = Sc18im700::new(bridge.release(), black_box(7));
-    let config = Srf08Config::default().opaque();
-    match Srf08Ring::<_, _, 16>::new(bridge, AnyDelay, config) {
-        Ok(mut ring) => {
-            let mut faults = FaultCounters::new();
-            let frame: RingFrame<16> = ring.read(&mut faults);
-            black_box((frame, faults));
-            if let Some(error) = ring.last_error() {
-                show::<SonarError>(error);
-                black_box(error.fault.kind());
-            }
-            black_box(ring.release().0.release());
-        }
-        Err(error) => show::<Srf08ConfigError>(error),
-    }
+    black_box(RingFrame { echoes: [Echo::Dead.opaque(); 16] }.dead_sensors().last());
 }
 
 fn any_fingerprint() -> Fingerprint {

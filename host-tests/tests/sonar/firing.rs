@@ -1,0 +1,72 @@
+//! The firing plan: sensors that fire together hear each other, and a plan that keeps them apart prevents it.
+
+use toposlam::{
+    FaultCounters,
+    ring::{Echo, RingFrame},
+    sonar::{FiringPlan, HcSr04Config, HcSr04Ring, MaxBotixConfig, MaxBotixRing, SonarRing, Srf08Config, Srf08Ring},
+};
+use toposlam_host::chip::{HcSr04Bank, I2cBus, MaxBotixBank, SimulatedTime, Srf08Bank};
+
+use crate::Waited;
+
+/// Near walls on the even sides, far ones on the odd sides, in whole centimetres.
+fn rough() -> RingFrame<16> {
+    let mut frame = RingFrame { echoes: [Echo::Silence; 16] };
+    for (sensor, echo) in (0_u16..).zip(&mut frame.echoes) {
+        *echo = Echo::Range { range_mm: if sensor % 2 == 0 { 500 + sensor * 20 } else { 3000 + sensor * 20 } };
+    }
+    frame
+}
+
+/// Every odd side then seems as near as the nearer of its neighbours; the even ones hear themselves first.
+fn disturbed() -> RingFrame<16> {
+    let (heard, mut frame) = (rough().echoes, rough());
+    for sensor in (1..16).step_by(2) {
+        let neighbours = [heard[sensor - 1], heard[(sensor + 1) % 16]];
+        frame.echoes[sensor] = neighbours.into_iter().min_by_key(|echo| echo.range_mm()).unwrap();
+    }
+    frame
+}
+
+fn assert_separates(name: &str, read: impl Fn(FiringPlan<16>) -> RingFrame<16>) {
+    assert_eq!(read(FiringPlan::together()), disturbed(), "{name}, together");
+    for groups in [2, 3, 4, 5, 16] {
+        assert_eq!(read(FiringPlan::interleaved(groups)), rough(), "{name} in {groups} groups");
+    }
+    // Pairs of neighbours are a bad plan, and show it.
+    let pairs = FiringPlan { group_of: std::array::from_fn(|sensor| (sensor / 2) as u8) };
+    assert_ne!(read(pairs), rough(), "{name} in pairs");
+}
+
+#[test]
+fn srf08_that_fire_together_disturb_their_neighbours_and_the_plan_prevents_it() {
+    assert_separates("SRF08", |plan| {
+        let mut devices = Srf08Bank::new(|| Some(rough()), 3);
+        devices.set_cross_talk(true);
+        let config = Srf08Config { plan, ..Srf08Config::DEFAULT };
+        Srf08Ring::new(I2cBus { devices }, &mut Waited::default(), config).unwrap().read(&mut FaultCounters::new())
+    });
+}
+
+#[test]
+fn maxbotix_that_fire_together_disturb_their_neighbours_and_the_plan_prevents_it() {
+    assert_separates("MaxBotix", |plan| {
+        let time = SimulatedTime::new(0, 0);
+        let mut devices = MaxBotixBank::new(|| Some(rough()), time.clone());
+        devices.set_cross_talk(true);
+        let config = MaxBotixConfig { plan, ..MaxBotixConfig::DEFAULT };
+        MaxBotixRing::new(I2cBus { devices }, time, config).unwrap().read(&mut FaultCounters::new())
+    });
+}
+
+#[test]
+fn hc_sr04_that_fire_together_disturb_their_neighbours_and_the_plan_prevents_it() {
+    assert_separates("HC-SR04", |plan| {
+        let time = SimulatedTime::new(0, 1000);
+        let bank = HcSr04Bank::new(|| Some(rough()), time.clone());
+        bank.set_cross_talk(true);
+        let config = HcSr04Config { plan, ..HcSr04Config::DEFAULT };
+        let mut ring = HcSr04Ring::new(bank.pins(), time.clone(), time, config).unwrap();
+        ring.read(&mut FaultCounters::new())
+    });
+}

@@ -1,0 +1,115 @@
+//! The ring of MaxBotix I2CXL-MaxSonar.
+
+use embedded_hal::i2c::{ErrorKind, NoAcknowledgeSource};
+use embedded_hal_mock::eh1::{
+    delay::{CheckedDelay, Transaction as Wait},
+    i2c::{Mock as I2cMock, Transaction},
+};
+use toposlam::{
+    FaultCounters,
+    ring::{Echo, RingFrame},
+    sonar::{FiringPlan, MaxBotixConfig, MaxBotixRing, SonarError, SonarFault, SonarRing},
+};
+use toposlam_host::chip::{I2cBus, MaxBotixBank, SensorFault, SimulatedTime};
+
+use crate::{World, assert_counted, without, world, world_frame};
+
+/// The world as these sensors tell it: in whole centimetres from 20 on.
+fn in_centimetres(mut frame: RingFrame<16>) -> RingFrame<16> {
+    for echo in &mut frame.echoes {
+        if let Echo::Range { range_mm } = echo {
+            *range_mm = ((*range_mm + 5) / 10).max(20) * 10;
+        }
+    }
+    frame
+}
+
+fn ring(
+    config: MaxBotixConfig<16>,
+    time: &SimulatedTime,
+    faults: &[(usize, SensorFault)],
+) -> MaxBotixRing<I2cBus<MaxBotixBank<World, 16>>, SimulatedTime, 16> {
+    let mut devices = MaxBotixBank::new(Box::new(world()) as World, time.clone());
+    for &(sensor, fault) in faults {
+        devices.set_fault(sensor, Some(fault));
+    }
+    MaxBotixRing::new(I2cBus { devices }, time.clone(), config).unwrap()
+}
+
+#[test]
+fn the_ring_reads_the_world_in_centimetres_and_takes_100_ms_for_each_group() {
+    for groups in [1, 2, 4] {
+        let time = SimulatedTime::new(0, 0);
+        let config = MaxBotixConfig { plan: FiringPlan::interleaved(groups), ..MaxBotixConfig::DEFAULT };
+        let mut ring = ring(config, &time, &[]);
+        let mut faults = FaultCounters::new();
+        for number in 0..50 {
+            assert_eq!(
+                ring.read(&mut faults),
+                in_centimetres(world_frame(number)),
+                "frame {number} in {groups} groups"
+            );
+        }
+        assert_eq!(faults, FaultCounters::new());
+        assert_eq!(time.now_ns(), 50 * u64::from(groups) * 100_000_000);
+    }
+}
+
+#[test]
+fn a_sensor_in_trouble_is_dead_and_counted_and_the_frame_takes_no_longer() {
+    let cases = [
+        (SensorFault::Absent, SonarFault::Silent),
+        (SensorFault::NeverDone, SonarFault::Silent),
+        (SensorFault::RefusesData, SonarFault::Silent),
+        (SensorFault::Zeros, SonarFault::Nonsense),
+        (SensorFault::Nonsense, SonarFault::Nonsense),
+        (SensorFault::BlocksBus, SonarFault::Bus),
+    ];
+    for sensor in [0_u8, 7, 15] {
+        for (defect, fault) in cases {
+            let time = SimulatedTime::new(0, 0);
+            let mut ring = ring(MaxBotixConfig::DEFAULT, &time, &[(sensor.into(), defect)]);
+            let mut faults = FaultCounters::new();
+            for number in 0..3 {
+                let expected = without(in_centimetres(world_frame(number)), |dead| dead == usize::from(sensor));
+                assert_eq!(ring.read(&mut faults), expected, "{defect:?} of sensor {sensor}");
+                assert_eq!(ring.last_error(), Some(SonarError { sensor, fault }));
+            }
+            assert_counted(&faults, Some(fault), 3);
+            assert_eq!(time.now_ns(), 3 * 2 * 100_000_000);
+        }
+    }
+}
+
+#[test]
+fn the_driver_puts_the_data_sheets_bytes_on_the_bus_at_the_data_sheets_times() {
+    let silent = ErrorKind::NoAcknowledge(NoAcknowledgeSource::Address);
+    // 0x0123 cm are 291, 0x02FD are 765: nothing heard.
+    let expected = [
+        Transaction::write(0x70, vec![81]),
+        Transaction::write(0x72, vec![81]),
+        Transaction::read(0x70, vec![0x01, 0x23]),
+        Transaction::read(0x72, vec![0x00, 0x00]).with_error(silent),
+        Transaction::read(0x72, vec![0x02, 0xFD]),
+        Transaction::write(0x71, vec![81]).with_error(silent),
+        Transaction::write(0x73, vec![81]),
+        Transaction::read(0x73, vec![0x00, 0x13]),
+    ];
+    let waits = [
+        Wait::delay_us(80_000),
+        Wait::delay_us(2000),
+        Wait::delay_us(18_000),
+        Wait::delay_us(80_000),
+        Wait::delay_us(20_000),
+    ];
+    let (bus, delay) = (I2cMock::new(&expected), CheckedDelay::new(&waits));
+    let mut ring = MaxBotixRing::<_, _, 4>::new(bus, delay, MaxBotixConfig::DEFAULT).unwrap();
+    let mut faults = FaultCounters::new();
+    let frame = ring.read(&mut faults);
+    assert_eq!(frame.echoes, [Echo::Range { range_mm: 2910 }, Echo::Dead, Echo::Silence, Echo::Dead]);
+    assert!(frame.dead_sensors().eq([1, 3]));
+    assert_eq!(ring.last_error(), Some(SonarError { sensor: 3, fault: SonarFault::Nonsense }));
+    let (mut bus, mut delay) = ring.release();
+    bus.done();
+    delay.done();
+}

@@ -1,0 +1,40 @@
+//! A clock that only moves when somebody waits for it or looks at it.
+
+use std::{cell::Cell, rc::Rc};
+
+use embedded_hal::delay::DelayNs;
+use toposlam::sonar::Microseconds;
+
+/// Simulated time, shared by its clones: the drivers wait with it and read it, the models act by it.
+#[derive(Clone, Debug)]
+pub struct SimulatedTime {
+    now_ns: Rc<Cell<u64>>,
+    look_ns: u64,
+}
+
+impl SimulatedTime {
+    /// A clock that starts at so many microseconds. Each look at it takes `look_ns`, which stands for the work in between;
+    /// with 0 the clock stands still for who only looks.
+    pub fn new(start_us: u64, look_ns: u64) -> Self {
+        Self { now_ns: Rc::new(Cell::new(start_us * 1000)), look_ns }
+    }
+
+    /// The time in nanoseconds; this look takes none.
+    pub fn now_ns(&self) -> u64 {
+        self.now_ns.get()
+    }
+}
+
+impl DelayNs for SimulatedTime {
+    fn delay_ns(&mut self, nanoseconds: u32) {
+        self.now_ns.set(self.now_ns.get() + u64::from(nanoseconds));
+    }
+}
+
+impl Microseconds for SimulatedTime {
+    fn now_us(&mut self) -> u32 {
+        self.now_ns.set(self.now_ns.get() + self.look_ns);
+        // It starts again at 0, as the driver expects.
+        (self.now_ns.get() / 1000) as u32
+    }
+}

@@ -1,0 +1,159 @@
+//! A ring of MaxBotix I2CXL-MaxSonar rangers (MB12x2) on one I2C bus.
+//!
+//! Source: MaxBotix, *I2CXL-MaxSonar-EZ series data sheet* PD11848. A written 81 starts a ranging; while it lasts the ranger
+//! ignores the bus. About 80 ms later a read gives two bytes, the range in centimetres, high byte first: 20 to 765, where
+//! 765 is what it says when nothing is in range. 100 ms from one ranging to the next let the sound die away.
+
+use core::fmt;
+
+use embedded_hal::i2c::I2c;
+
+use super::{FiringPlan, I2cRanger, I2cRing, RangingTiming, Reading, SonarFault, i2c_ring::addresses_fit};
+use crate::ring::Echo;
+
+const TAKE_A_RANGE: u8 = 81;
+const NEAREST_CM: u16 = 20;
+const NOTHING_HEARD_CM: u16 = 765;
+const POLL_INTERVAL_US: u32 = 2000;
+
+/// The data sheet takes all but four 8-bit addresses (0, 80, 164 and 170); those below 0x08 belong to the bus itself.
+pub(super) const fn is_address(address: u8) -> bool {
+    matches!(address, 0x08..=0x7F) && !matches!(address << 1, 80 | 164 | 170)
+}
+
+/// How a ring of I2CXL-MaxSonar is wired and read.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct MaxBotixConfig<const SONARS: usize> {
+    /// The 7-bit address of sensor 0; sensor *i* is at this plus *i*. All of them from 0x08 to 0x7F and none of 0x28, 0x52
+    /// and 0x55, which the sensor refuses. Default 0x70, so at most 16 sensors.
+    pub first_address: u8,
+    /// Which sensors fire together. Default: two groups, even and odd.
+    pub plan: FiringPlan<SONARS>,
+    /// From the start of a ranging to the first question, in milliseconds, at least 1. Default 80.
+    pub ranging_ms: u8,
+    /// From the start of a group to that of the next, in milliseconds, `ranging_ms` at least. Default 100. Until then a
+    /// sensor that has not answered is asked again, every 2 ms.
+    pub cycle_ms: u8,
+}
+
+impl<const SONARS: usize> MaxBotixConfig<SONARS> {
+    /// The data sheet's values, two firing groups.
+    pub const DEFAULT: Self =
+        Self { first_address: 0x70, plan: FiringPlan::interleaved(2), ranging_ms: 80, cycle_ms: 100 };
+}
+
+impl<const SONARS: usize> Default for MaxBotixConfig<SONARS> {
+    fn default() -> Self {
+        Self::DEFAULT
+    }
+}
+
+/// What the centimetres of a reply mean.
+fn echo(range_cm: u16) -> Result<Echo, SonarFault> {
+    match range_cm {
+        NOTHING_HEARD_CM => Ok(Echo::Silence),
+        NEAREST_CM..NOTHING_HEARD_CM => Ok(Echo::Range { range_mm: range_cm * 10 }),
+        _ => Err(SonarFault::Nonsense),
+    }
+}
+
+impl<const SONARS: usize> I2cRanger<SONARS> for MaxBotixConfig<SONARS> {
+    type ConfigError = MaxBotixConfigError;
+
+    fn check(&self) -> Result<(), MaxBotixConfigError> {
+        let mut addresses = (self.first_address..=u8::MAX).take(SONARS);
+        if !addresses_fit(self.first_address, SONARS, 0x08..=0x7F) || !addresses.all(is_address) {
+            return Err(MaxBotixConfigError::FirstAddress);
+        }
+        if self.ranging_ms == 0 || self.ranging_ms > self.cycle_ms {
+            return Err(MaxBotixConfigError::Ranging);
+        }
+        Ok(())
+    }
+
+    fn first_address(&self) -> u8 {
+        self.first_address
+    }
+
+    fn plan(&self) -> FiringPlan<SONARS> {
+        self.plan
+    }
+
+    fn timing(&self) -> RangingTiming {
+        let cycle_us = u32::from(self.cycle_ms) * 1000;
+        let first_ask_us = u32::from(self.ranging_ms) * 1000;
+        RangingTiming { first_ask_us, poll_interval_us: POLL_INTERVAL_US, timeout_us: cycle_us, cycle_us }
+    }
+
+    fn start<BUS: I2c>(&self, bus: &mut BUS, address: u8) -> Result<(), BUS::Error> {
+        bus.write(address, &[TAKE_A_RANGE])
+    }
+
+    fn ask<BUS: I2c>(&self, bus: &mut BUS, address: u8) -> Result<Reading, BUS::Error> {
+        let mut range_cm = [0; 2];
+        bus.read(address, &mut range_cm)?;
+        Ok(Reading::Settled(echo(u16::from_be_bytes(range_cm))))
+    }
+}
+
+/// Which field of a [`MaxBotixConfig`] cannot be.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum MaxBotixConfigError {
+    /// `first_address`: not every sensor of the ring gets an address that it can have.
+    FirstAddress,
+    /// `ranging_ms`: 0, or longer than `cycle_ms`.
+    Ranging,
+}
+
+impl fmt::Display for MaxBotixConfigError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::FirstAddress => "first_address: sensors need addresses from 0x08 to 0x7F but 0x28, 0x52 and 0x55",
+            Self::Ranging => "ranging_ms: must be from 1 to cycle_ms",
+        })
+    }
+}
+
+impl core::error::Error for MaxBotixConfigError {}
+
+/// A ring of `SONARS` I2CXL-MaxSonar at consecutive addresses of one I2C bus.
+///
+/// A frame takes `cycle_ms` for each firing group, whatever the sensors do, and the time on the bus.
+pub type MaxBotixRing<BUS, DELAY, const SONARS: usize> = I2cRing<BUS, DELAY, MaxBotixConfig<SONARS>, SONARS>;
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn centimetres_become_millimetres_and_765_is_silence() {
+        for (range_cm, expected) in [
+            (0, Err(SonarFault::Nonsense)),
+            (19, Err(SonarFault::Nonsense)),
+            (20, Ok(Echo::Range { range_mm: 200 })),
+            (764, Ok(Echo::Range { range_mm: 7640 })),
+            (765, Ok(Echo::Silence)),
+            (766, Err(SonarFault::Nonsense)),
+            (u16::MAX, Err(SonarFault::Nonsense)),
+        ] {
+            assert_eq!(echo(range_cm), expected, "{range_cm} cm");
+        }
+    }
+
+    #[test]
+    fn the_configuration_names_the_field_that_cannot_be() {
+        let good = MaxBotixConfig::<16>::DEFAULT;
+        for first_address in [0x08, 0x18, 0x29, 0x42, 0x56, 0x70] {
+            assert_eq!(MaxBotixConfig { first_address, ..good }.check(), Ok(()), "{first_address:#x}");
+        }
+        for first_address in [0x00, 0x07, 0x19, 0x28, 0x43, 0x52, 0x53, 0x54, 0x55, 0x71, 0x80, 0xFF] {
+            let config = MaxBotixConfig { first_address, ..good };
+            assert_eq!(config.check(), Err(MaxBotixConfigError::FirstAddress), "{first_address:#x}");
+        }
+        for (ranging_ms, cycle_ms) in [(0, 100), (101, 100)] {
+            let config = MaxBotixConfig { ranging_ms, cycle_ms, ..good };
+            assert_eq!(config.check(), Err(MaxBotixConfigError::Ranging));
+        }
+    }
+}
