@@ -71,6 +71,10 @@ impl<const V: usize> Filter<V> for Believer<V> {
         &self.faults
     }
 
+    fn recent(&self, ago: usize) -> Option<u8> {
+        (ago == 0).then_some(self.location)
+    }
+
     /// Two thirds for the location, the rest among the vertices beside it.
     fn place_probability_q16(&self, vertex: u8) -> u32 {
         match vertex.abs_diff(self.location) {
