@@ -2,6 +2,7 @@
 
 use crate::place::{Place, PlaceConfig, PlaceConfigError, PlaceDetector};
 use crate::ring::{RingFrame, RingGeometry};
+use crate::snapshot::{FILTER_SECTION, Resume, Snapshot, SnapshotError, Writer};
 use crate::wire::{Capacities, Hello, Message, QueueFull, Reporter};
 use crate::{ConfigError, FaultCounters, Filter, Map, Observation, Turn, Update};
 use core::fmt;
@@ -33,12 +34,14 @@ pub struct Mapper<const SONARS: usize, const V: usize, F> {
     detector: PlaceDetector<SONARS>,
     filter: F,
     reporter: Reporter<V>,
+    /// Whether the next place begins a sequence.
+    begins: bool,
 }
 
 impl<const SONARS: usize, const V: usize, F: Filter<V>> Mapper<SONARS, V, F> {
     /// A mapper that waits for [`Mapper::start`].
     pub const fn new() -> Self {
-        Self { detector: PlaceDetector::new(), filter: F::UNSTARTED, reporter: Reporter::new() }
+        Self { detector: PlaceDetector::new(), filter: F::UNSTARTED, reporter: Reporter::new(), begins: false }
     }
 
     /// Forgets everything and starts anew.
@@ -50,6 +53,7 @@ impl<const SONARS: usize, const V: usize, F: Filter<V>> Mapper<SONARS, V, F> {
         self.filter.start(config.filter, config.seed).map_err(MapperError::Filter)?;
         let capacities = Capacities::new(V as u8, F::capacities(&config.filter), SONARS as u8);
         self.reporter.start(Hello::new(config.boot, config.seed, capacities), FRAMES_PER_HELLO);
+        self.begins = false;
         Ok(())
     }
 
@@ -68,7 +72,8 @@ impl<const SONARS: usize, const V: usize, F: Filter<V>> Mapper<SONARS, V, F> {
     ) -> Option<(Place, Update)> {
         let seen = self.detector.observe(frame).map(|place| {
             let Place { fingerprint, degree, .. } = place;
-            let update = self.filter.observe(Observation { turn, degree, ..Observation::new(fingerprint) });
+            let begins = core::mem::take(&mut self.begins);
+            let update = self.filter.observe(Observation { fingerprint, turn, degree, begins });
             // A place is no state: one that the queue refuses is missing in the listener's log, and in nothing else.
             let _ = send(&Message::Place {
                 place_index: update.place_index,
@@ -87,6 +92,37 @@ impl<const SONARS: usize, const V: usize, F: Filter<V>> Mapper<SONARS, V, F> {
         faults.add(self.filter.faults());
         self.reporter.tick(self.filter.map(), &faults, &mut send);
         seen
+    }
+
+    /// Writes a whole snapshot into a buffer and tells its length. It has as many hypotheses as there is room for; the map that
+    /// was told stays what it is. `RobustFilter::SNAPSHOT_BYTES` has room for all. For the time between two places.
+    ///
+    /// # Errors
+    /// [`SnapshotError::Full`] when there is no room for the best hypothesis; [`SnapshotError::Unsupported`].
+    pub fn snapshot(&mut self, buffer: &mut [u8]) -> Result<usize, SnapshotError> {
+        let mut writer = Writer::new(buffer)?;
+        self.save(&mut writer)?;
+        writer.finish()
+    }
+
+    /// Writes the mapper's section of a snapshot, behind those of other stages: it takes the room that is left.
+    ///
+    /// # Errors
+    /// As [`Mapper::snapshot`].
+    pub fn save(&mut self, writer: &mut Writer<'_>) -> Result<(), SnapshotError> {
+        writer.section(FILTER_SECTION, |section| self.filter.save(section))
+    }
+
+    /// Goes on with a snapshot, the filter's settings and seed in it included. The mapper must have been started; place
+    /// detector and reporter go on as they are, so that a listener hears the restored map in turn.
+    ///
+    /// # Errors
+    /// [`SnapshotError`] says what is wrong with the bytes; nothing has changed then.
+    pub fn restore(&mut self, bytes: &[u8], resume: Resume) -> Result<(), SnapshotError> {
+        let section = Snapshot::open(bytes)?.section(FILTER_SECTION).ok_or(SnapshotError::Contents)?;
+        self.filter.restore(section)?;
+        self.begins = resume == Resume::Elsewhere;
+        Ok(())
     }
 
     /// The best map.
