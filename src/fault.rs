@@ -25,11 +25,15 @@ pub enum FaultKind {
     WireFull = 8,
     /// A frame on the serial line was corrupt, cut or foreign.
     WireCorrupt = 9,
+    /// A snapshot could not be stored.
+    StoreFailed = 10,
+    /// A snapshot was not taken: damaged, of another version or other capacities, or not what a filter says.
+    SnapshotRejected = 11,
 }
 
 impl FaultKind {
     /// Every kind, in the order of its number.
-    pub const ALL: [Self; 10] = [
+    pub const ALL: [Self; 12] = [
         Self::SonarSilent,
         Self::SonarNonsense,
         Self::BusError,
@@ -40,6 +44,8 @@ impl FaultKind {
         Self::HistoryFull,
         Self::WireFull,
         Self::WireCorrupt,
+        Self::StoreFailed,
+        Self::SnapshotRejected,
     ];
 }
 
