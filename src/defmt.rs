@@ -34,6 +34,8 @@ texts!(FaultKind {
     HistoryFull => "HistoryFull",
     WireFull => "WireFull",
     WireCorrupt => "WireCorrupt",
+    StoreFailed => "StoreFailed",
+    SnapshotRejected => "SnapshotRejected",
 });
 
 texts!(Turn {

@@ -150,6 +150,8 @@ pub mod ring;
 #[cfg(feature = "snapshot")]
 pub mod snapshot;
 pub mod sonar;
+#[cfg(feature = "store")]
+pub mod store;
 #[cfg(feature = "wire")]
 pub mod wire;
 

@@ -102,18 +102,16 @@ fn drives(places: usize) -> Vec<Drive> {
             .collect()
     };
     let all = Hints { turn: true, degree: true, missing_percent: 20, wrong_percent: 5 };
-    let plain = |name, observations| Drive {
-        name,
-        config: RobustConfig::DEFAULT,
-        known: false,
-        observations,
-        localise: None,
-    };
+    let plain =
+        |name, observations| Drive { name, config: RobustConfig::DEFAULT, known: false, observations, localise: None };
     let mut drives = vec![
         plain("floor", walk(&floor(), Hints::default(), 1, &[])),
         plain("floor with hints", walk(&floor(), all, 2, &[])),
         plain("six rooms, carried twice", walk(&six_rooms(), all, 3, &[places / 3, places / 2])),
-        Drive { config: RobustConfig { moves: 3, ..RobustConfig::DEFAULT }, ..plain("easy", walk(&easy(), all, 4, &[])) },
+        Drive {
+            config: RobustConfig { moves: 3, ..RobustConfig::DEFAULT },
+            ..plain("easy", walk(&easy(), all, 4, &[]))
+        },
         Drive { known: true, ..plain("known map", walk(&easy(), all, 5, &[])) },
         Drive {
             known: true,
