@@ -81,7 +81,9 @@
 //! | Feature | Adds |
 //! |---|---|
 //! | none | everything but the lines below: detector, filter, n-grams, consistency, drivers of the sonars |
-//! | `wire` | the serial protocol (module `wire`) and `Mapper`, all stages in one |
+//! | `snapshot` | snapshots of the map and the filter as byte strings (module `snapshot`) |
+//! | `store` | snapshots in flash, wear-levelled (module `store`) |
+//! | `wire` | the serial protocol (module `wire`) and `Mapper`, all stages in one; implies `snapshot` |
 //! | `defmt` | `defmt::Format` for what a firmware logs |
 //! | `firmware`, `pll` | the images in `src/bin`; only for the reference board's target |
 //!
@@ -147,7 +149,11 @@ mod observation;
 pub mod place;
 pub mod reference;
 pub mod ring;
+#[cfg(feature = "snapshot")]
+pub mod snapshot;
 pub mod sonar;
+#[cfg(feature = "store")]
+pub mod store;
 #[cfg(feature = "wire")]
 pub mod wire;
 

@@ -2,6 +2,7 @@
 
 use crate::place::{Place, PlaceConfig, PlaceConfigError, PlaceDetector};
 use crate::ring::{RingFrame, RingGeometry};
+use crate::snapshot::{FILTER_SECTION, Resume, Snapshot, SnapshotError, Writer};
 use crate::wire::{Capacities, Hello, Message, QueueFull, Reporter, ResetCause};
 use crate::{ConfigError, FaultCounters, Filter, Map, Observation, Turn, Update};
 use core::fmt;
@@ -47,7 +48,13 @@ pub struct Mapper<const SONARS: usize, const V: usize, F> {
 impl<const SONARS: usize, const V: usize, F: Filter<V>> Mapper<SONARS, V, F> {
     /// A mapper that waits for [`Mapper::start`].
     pub const fn new() -> Self {
-        Self { detector: PlaceDetector::new(), filter: F::UNSTARTED, reporter: Reporter::new(), begins: false, slices: 0 }
+        Self {
+            detector: PlaceDetector::new(),
+            filter: F::UNSTARTED,
+            reporter: Reporter::new(),
+            begins: false,
+            slices: 0,
+        }
     }
 
     /// Forgets everything and starts anew.
@@ -98,7 +105,7 @@ impl<const SONARS: usize, const V: usize, F: Filter<V>> Mapper<SONARS, V, F> {
         let seen = self.detector.observe(frame).map(|place| {
             let Place { fingerprint, degree, .. } = place;
             let begins = core::mem::take(&mut self.begins);
-            let update = self.filter.observe(Observation { turn, degree, begins, ..Observation::new(fingerprint) });
+            let update = self.filter.observe(Observation { fingerprint, turn, degree, begins });
             // A place is no state: one that the queue refuses is missing in the listener's log, and in nothing else.
             let _ = send(&Message::Place {
                 place_index: update.place_index,
@@ -130,6 +137,37 @@ impl<const SONARS: usize, const V: usize, F: Filter<V>> Mapper<SONARS, V, F> {
     /// The robot has not moved from the place that was reported last; see [`PlaceDetector::stay`].
     pub fn stay(&mut self) {
         self.detector.stay();
+    }
+
+    /// Writes a whole snapshot into a buffer and tells its length. It has as many hypotheses as there is room for; the map that
+    /// was told stays what it is. `RobustFilter::SNAPSHOT_BYTES` has room for all. For the time between two places.
+    ///
+    /// # Errors
+    /// [`SnapshotError::Full`] when there is no room for the best hypothesis; [`SnapshotError::Unsupported`].
+    pub fn snapshot(&mut self, buffer: &mut [u8]) -> Result<usize, SnapshotError> {
+        let mut writer = Writer::new(buffer)?;
+        self.save(&mut writer)?;
+        writer.finish()
+    }
+
+    /// Writes the mapper's section of a snapshot, behind those of other stages: it takes the room that is left.
+    ///
+    /// # Errors
+    /// As [`Mapper::snapshot`].
+    pub fn save(&mut self, writer: &mut Writer<'_>) -> Result<(), SnapshotError> {
+        writer.section(FILTER_SECTION, |section| self.filter.save(section))
+    }
+
+    /// Goes on with a snapshot, the filter's settings and seed in it included. The mapper must have been started; place
+    /// detector and reporter go on as they are, so that a listener hears the restored map in turn.
+    ///
+    /// # Errors
+    /// [`SnapshotError`] says what is wrong with the bytes; nothing has changed then.
+    pub fn restore(&mut self, bytes: &[u8], resume: Resume) -> Result<(), SnapshotError> {
+        let section = Snapshot::open(bytes)?.section(FILTER_SECTION).ok_or(SnapshotError::Contents)?;
+        self.filter.restore(section)?;
+        self.begins = resume == Resume::Elsewhere;
+        Ok(())
     }
 
     /// The best map.

@@ -27,6 +27,10 @@ pub const PLACE: PlaceConfig = PlaceConfig::DEFAULT;
 /// The filter's settings.
 pub const FILTER: RobustConfig = RobustConfig::DEFAULT;
 
+/// The buffer for a snapshot, in bytes.
+#[cfg(feature = "snapshot")]
+pub const SNAPSHOT_BYTES: usize = 8 * 1024;
+
 /// The detector of the reference robot.
 pub type Detector = PlaceDetector<SONARS>;
 /// The filter of the reference robot.
@@ -55,3 +59,6 @@ pub const PAPER_HISTORY_WORDS: usize = 8;
 pub const PAPER_FILTER: Config = Config { direction: Direction::HistoryToMap, ..Config::DEFAULT };
 /// The paper's filter in the place of the reference robot's.
 pub type PaperReference = PaperFilter<PAPER_PARTICLES, VERTICES, PAPER_HISTORY_WORDS>;
+
+#[cfg(feature = "snapshot")]
+const _: () = assert!(Filter::SNAPSHOT_BYTES <= SNAPSHOT_BYTES, "the buffer has room for every hypothesis");

@@ -49,6 +49,10 @@ impl Filter<VERTICES> for Notes {
         &self.faults
     }
 
+    fn recent(&self, _: usize) -> Option<u8> {
+        None
+    }
+
     fn place_probability_q16(&self, _: u8) -> u32 {
         0
     }

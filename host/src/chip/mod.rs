@@ -1,10 +1,13 @@
-//! Behavioural models of the sensors and of the chips between them and the controller, for the emulator and for tests.
+//! Behavioural models of the sensors, of the chips between them and the controller, and of its flash, for the emulator and for
+//! tests.
 //!
 //! [`Sc18im700`] takes the bytes that the firmware sends and gives back the bytes that the real chip would; behind it, or on
 //! an [`I2cBus`] of the controller's own, [`Srf08Bank`] and [`MaxBotixBank`] answer for rangers. [`HcSr04Bank`] moves the
 //! pins of its rangers. All of them stand in a world of ring frames; [`SimulatedTime`] is the time of those that need one.
+//! [`FlashModel`] is a NOR flash whose power can be cut at any operation.
 
 mod bus;
+mod flash;
 mod hcsr04;
 mod maxbotix;
 mod sc18im700;
@@ -13,6 +16,7 @@ mod surroundings;
 mod time;
 
 pub use bus::{BusAnswer, I2cBus, I2cDevices};
+pub use flash::{Cut, FlashFault, FlashModel, Tear};
 pub use hcsr04::{EchoPin, HcSr04Bank, HcSr04Fault, PinBroken, TriggerPin};
 pub use maxbotix::MaxBotixBank;
 pub use sc18im700::Sc18im700;

@@ -129,10 +129,8 @@ impl Rover {
     fn fits(&self, position: Point) -> bool {
         (0..16).all(|direction| {
             let (sine, cosine) = (f64::from(direction) * std::f64::consts::TAU / 16.0).sin_cos();
-            let edge = Point::new(
-                position.x_mm + cosine * self.body.radius_mm,
-                position.y_mm + sine * self.body.radius_mm,
-            );
+            let edge =
+                Point::new(position.x_mm + cosine * self.body.radius_mm, position.y_mm + sine * self.body.radius_mm);
             !self.plan.is_wall_at(edge)
         })
     }

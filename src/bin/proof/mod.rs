@@ -15,6 +15,7 @@ use toposlam::{
     place::{PlaceConfig, PlaceConfigError, PlaceDetector},
     reference,
     ring::{Echo, RingFrame, RingGeometry},
+    snapshot::{FILTER_SECTION, Resume, Snapshot, SnapshotError, SnapshotPolicy, Writer},
     wire::{
         Decoder, EncodeError, Encoder, Hello, HelloError, Inbox, JourneyState, MAX_FRAME_BYTES, Message, Outcome,
         Payload, Picture, Progress, QueueFull, Refusal, Reply, Reporter, Request, ResetCause, Setting, Settings,
@@ -221,6 +222,14 @@ fn robust<const N: usize, const V: usize, const HISTORY: usize>(filter: &mut Rob
     for vertex in filter.path() {
         black_box(vertex);
     }
+    let mut buffer = black_box([0; 100]);
+    if let Ok(mut writer) = Writer::new(&mut buffer) {
+        forget(writer.section(FILTER_SECTION, |section| filter.save(section)));
+        forget(writer.finish());
+    }
+    if let Some(section) = Snapshot::open(&buffer).ok().and_then(|snapshot| snapshot.section(FILTER_SECTION)) {
+        forget(filter.restore(section));
+    }
 }
 
 fn any_frame() -> RingFrame<16> {
@@ -256,12 +265,55 @@ pub(crate) fn mapper() {
     mapper.hurry();
     black_box(mapper.reset(&reference::MAPPER.opaque(), any_answer).is_ok());
     black_box((mapper.map(), mapper.filter(), mapper.detector()));
+    snapshot(mapper);
     static REPORTER: ConstStaticCell<Reporter<VERTICES>> = ConstStaticCell::new(Reporter::new());
     let Some(reporter) = REPORTER.try_take() else { return };
     reporter.tick(mapper.map(), &FaultCounters::new().opaque(), any_answer);
     reporter.hurry();
     reporter.forget(any_answer);
     black_box((reporter.refused(), map_digest(mapper.map())));
+}
+
+/// Whether something worked, which does not matter here.
+fn forget<T, ERROR>(outcome: Result<T, ERROR>) {
+    black_box(outcome.is_ok());
+}
+
+fn snapshot(mapper: &mut reference::RobotMapper) {
+    static BYTES: ConstStaticCell<[u8; 512]> = ConstStaticCell::new([0; 512]);
+    let Some(buffer) = BYTES.try_take().and_then(|bytes| bytes.get_mut(..black_box(500))) else { return };
+    if let Err(error) = mapper.snapshot(buffer) {
+        show::<SnapshotError>(error);
+    }
+    let resume = [Resume::InPlace, Resume::Elsewhere].opaque().first().copied().unwrap_or(Resume::InPlace);
+    if let Err(error) = mapper.restore(buffer, resume) {
+        show::<SnapshotError>(error);
+    }
+    if let Ok(mut writer) = Writer::new(buffer) {
+        forget(writer.section(black_box(9), |section| {
+            section.u8(black_box(1))?;
+            section.u16(black_box(2))?;
+            section.u32(black_box(2))?;
+            section.u64(black_box(3))?;
+            section.f32(black_box(4.0))?;
+            section.bytes(black_box(&[1, 2, 3]))
+        }));
+        forget(mapper.save(&mut writer));
+        forget(writer.finish());
+    }
+    if let Ok(snapshot) = Snapshot::open(buffer) {
+        black_box(snapshot.length());
+        if let Some(mut section) = snapshot.section(black_box(9)) {
+            forget(section.u8());
+            forget(section.u16());
+            forget(section.u32());
+            forget(section.u64());
+            forget(section.f32());
+            forget(section.bytes(black_box(7)));
+            forget(section.finish());
+        }
+    }
+    black_box(SnapshotPolicy::default().opaque().is_due(black_box(7)));
 }
 
 pub(crate) fn wire() {

@@ -53,6 +53,25 @@ impl<const N: usize, const V: usize, const T: usize> Beam<N, V, T> {
         }
     }
 
+    /// Begins with no hypothesis, for those that are [appended](Beam::append).
+    #[cfg(feature = "snapshot")]
+    pub(super) fn begin_empty(&mut self) {
+        self.clear();
+        self.len = 0;
+    }
+
+    /// Puts a hypothesis behind the others; one with the map and place of another, or without room, is left out.
+    #[cfg(feature = "snapshot")]
+    pub(super) fn append(&mut self, hypothesis: &Hypothesis<V, T>) {
+        let key = hypothesis.key();
+        if self.len < N && self.iter().all(|held| held.key() != key) {
+            self.len += 1;
+            if let Some(slot) = self.get_mut(self.len - 1) {
+                slot.clone_from(hypothesis);
+            }
+        }
+    }
+
     pub(super) fn len(&self) -> usize {
         self.len
     }

@@ -34,7 +34,7 @@ impl<const V: usize, const T: usize> Hypothesis<V, T> {
         } else {
             let mut left = self.tally(from);
             let before = prices.exit_evidence(&left, self.degree(from));
-            left.exits += 1;
+            left.exits = left.exits.saturating_add(1);
             let is_new_edge = !self.is_edge(from, vertex);
             gain += prices.exit_evidence(&left, self.degree(from) + u32::from(is_new_edge)) - before;
             if is_new_edge {

@@ -29,7 +29,7 @@ pub(super) struct Hypothesis<const V: usize, const T: usize> {
     /// By how much the evidence of the map, all its paths together, exceeds that of this one path, as last computed.
     pub(super) surplus: f32,
     /// Evidence of counts that have faded.
-    faded: f32,
+    pub(super) faded: f32,
     /// Identifies the map; vertices are numbered in the order of their first visit.
     pub(super) map_key: u32,
     pub(super) path: [u8; T],
@@ -203,13 +203,19 @@ impl<const V: usize, const T: usize> Hypothesis<V, T> {
             from = vertex;
         }
         self.place = from;
-        self.map_key = 0;
+        self.map_key = self.key_of_edges();
+        self.evidence = self.total(prices);
+    }
+
+    /// The key of a map with these edges.
+    pub(super) fn key_of_edges(&self) -> u32 {
+        let mut key = 0;
         for vertex in 0..self.vertices {
             for neighbour in bits(u64::from(self.row(vertex))).filter(|&neighbour| neighbour > vertex) {
-                self.map_key ^= edge_key(vertex, neighbour);
+                key ^= edge_key(vertex, neighbour);
             }
         }
-        self.evidence = self.total(prices);
+        key
     }
 
     /// The evidence from the counts.

@@ -19,6 +19,8 @@ mod names;
 mod noise;
 mod prices;
 mod record;
+#[cfg(feature = "snapshot")]
+mod snapshot;
 mod splits;
 mod tally;
 mod tell;

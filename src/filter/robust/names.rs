@@ -8,13 +8,13 @@ use crate::Map;
 #[derive(Clone, Debug)]
 pub(super) struct Names<const V: usize, const T: usize> {
     /// The published vertex of each observation of the record.
-    path: [u8; T],
+    pub(super) path: [u8; T],
     /// For each vertex of the best hypothesis its published number.
-    names: [u8; V],
+    pub(super) names: [u8; V],
     /// For each published number before the last update the number now; [`NOWHERE`] when it is gone.
-    renamed: [u8; V],
+    pub(super) renamed: [u8; V],
     /// How many vertices were published before.
-    vertices: u8,
+    pub(super) vertices: u8,
 }
 
 impl<const V: usize, const T: usize> Names<V, T> {

@@ -54,7 +54,12 @@ impl Prices {
 
     /// Takes a new standard deviation of the labels, in steps.
     pub(super) fn set_noise(&mut self, deviation_steps: f32) {
-        self.scale = SHAPE * deviation_steps * deviation_steps;
+        self.set_scale(SHAPE * deviation_steps * deviation_steps);
+    }
+
+    /// Takes a new scale, in steps².
+    pub(super) fn set_scale(&mut self, scale: f32) {
+        self.scale = scale;
         self.label_constant =
             HALF_LN_2_PI - libm::logf(LABEL_RANGE_STEPS) - ln_gamma(SHAPE) + SHAPE * libm::logf(self.scale);
     }

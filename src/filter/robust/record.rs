@@ -14,11 +14,11 @@ const CARRIED: u8 = 1 << 6;
 /// The newest `T` observations, the oldest first: 3 bytes each.
 #[derive(Clone, Debug)]
 pub(super) struct Record<const T: usize> {
-    steps: [u16; T],
+    pub(super) steps: [u16; T],
     /// Turn in bits 0 and 1, degree in bits 2 to 4, bit 5 for the first place of a sequence, bit 6 where
     /// the robot seems to have been carried.
-    hints: [u8; T],
-    len: usize,
+    pub(super) hints: [u8; T],
+    pub(super) len: usize,
 }
 
 /// One observation as the inference reads it.
@@ -39,6 +39,12 @@ impl Entry {
             TURN_ON => Some(Turn::On),
             _ => None,
         }
+    }
+
+    /// Whether an entry can have these hints.
+    #[cfg(feature = "snapshot")]
+    pub(super) const fn is_possible(hints: u8) -> bool {
+        hints & 3 <= TURN_ON && hints < 1 << 7
     }
 
     /// The degree, 1 to [`DEGREE_MAX`]; 0 when it is unknown.

@@ -4,13 +4,13 @@ use super::record::{DEGREE_MAX, Entry};
 use crate::Fingerprint;
 
 /// Counts of what left the record are halved beyond this many visits, so that old places fade.
-const FADE_VISITS: u16 = 512;
+pub(super) const FADE_VISITS: u16 = 512;
 
 /// The sufficient statistics of one vertex: 20 bytes.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Tally {
-    mean: f32,
-    scatter: f32,
+    pub(super) mean: f32,
+    pub(super) scatter: f32,
     pub(super) visits: u16,
     /// How many moves left the vertex.
     pub(super) exits: u16,

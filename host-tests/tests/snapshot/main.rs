@@ -1,0 +1,160 @@
+//! A snapshot has all that the filter goes on with, and nothing that is not a snapshot is taken for one.
+
+mod bad_bytes;
+#[path = "../common/mod.rs"]
+mod common;
+mod exact;
+mod mapper;
+mod specification;
+
+use common::environments::{easy, floor, six_rooms};
+use common::robot::{Hints, Robot};
+use toposlam::snapshot::{FILTER_SECTION, Reader, Snapshot, SnapshotError, Writer};
+use toposlam::{Fingerprint, Map, Observation, RobustConfig, RobustFilter, Update};
+
+/// A drive: settings of a filter, and what becomes of it.
+#[derive(Clone)]
+struct Drive {
+    name: &'static str,
+    config: RobustConfig,
+    /// Whether the filter begins with a map.
+    known: bool,
+    /// The robot visits, and the filter polishes so often behind each.
+    observations: Vec<(Observation, usize)>,
+    /// From where to where the filter only localises.
+    localise: Option<(usize, usize)>,
+}
+
+impl Drive {
+    fn start<const N: usize, const V: usize, const T: usize>(&self) -> Box<RobustFilter<N, V, T>> {
+        let mut filter = Box::new(RobustFilter::new());
+        let config = RobustConfig { hypotheses: N as u8, ..self.config };
+        if self.known {
+            let mut map = Map::new();
+            for (number, radius_mm) in [900, 1300, 1700, 2100, 2500].into_iter().enumerate() {
+                let label = Fingerprint::from_radius_mm(radius_mm).unwrap();
+                let vertex = map.add_vertex(label).unwrap();
+                (0..3 * number).for_each(|_| map.observe(vertex, label));
+            }
+            [(0, 1), (1, 2), (2, 3), (3, 4), (4, 0), (0, 2)].iter().for_each(|&(a, b)| map.add_edge(a, b));
+            filter.start_with_map(config, 7, &map).unwrap();
+        } else {
+            filter.start(config, 7).unwrap();
+        }
+        filter
+    }
+
+    /// Makes one step; tells what the filter told, and what it then holds.
+    fn step<const N: usize, const V: usize, const T: usize>(
+        &self,
+        filter: &mut RobustFilter<N, V, T>,
+        index: usize,
+    ) -> (Update, Held) {
+        if let Some((from, until)) = self.localise {
+            filter.set_localise_only((from..until).contains(&index));
+        }
+        let (observation, polish) = self.observations[index];
+        let update = filter.observe(observation);
+        (0..polish).for_each(|_| filter.polish());
+        (update, held(filter))
+    }
+}
+
+/// All that a filter can be asked.
+#[derive(Clone, PartialEq, Debug)]
+struct Held {
+    /// What it told last.
+    told: String,
+    /// The evidence of the best hypothesis, and what other paths add, by their bits.
+    evidence: [u32; 2],
+}
+
+fn held<const N: usize, const V: usize, const T: usize>(filter: &RobustFilter<N, V, T>) -> Held {
+    let map = filter.map();
+    let vertices: Vec<_> = (0..map.vertices())
+        .map(|vertex| (map.label(vertex), map.visits(vertex).min(512), filter.place_probability_q16(vertex)))
+        .collect();
+    let edges: Vec<_> = map.edges().collect();
+    let renamed: Vec<_> = (0..V as u8).map(|before| filter.renamed(before)).collect();
+    let path: Vec<_> = filter.path().collect();
+    let (evidence, surplus) = filter.evidence();
+    let told = format!(
+        "{vertices:?} {edges:?} {renamed:?} {path:?} {} {} {} {:?}",
+        filter.noise_mm(),
+        filter.observed(),
+        filter.map_probability_q16(),
+        filter.worst()
+    );
+    Held { told, evidence: [evidence.to_bits(), surplus.to_bits()] }
+}
+
+/// Drives of all kinds; the histories of the filters are shorter.
+fn drives(places: usize) -> Vec<Drive> {
+    let walk = |environment: &toposlam_host::evaluation::environment::Environment, hints, seed, carried: &[usize]| {
+        let mut robot = Robot::new(environment, hints, seed);
+        (0..places)
+            .map(|index| {
+                if carried.contains(&index) {
+                    robot.carry_off(true);
+                }
+                (robot.step(), index * 7 % 4)
+            })
+            .collect()
+    };
+    let all = Hints { turn: true, degree: true, missing_percent: 20, wrong_percent: 5 };
+    let plain =
+        |name, observations| Drive { name, config: RobustConfig::DEFAULT, known: false, observations, localise: None };
+    let mut drives = vec![
+        plain("floor", walk(&floor(), Hints::default(), 1, &[])),
+        plain("floor with hints", walk(&floor(), all, 2, &[])),
+        plain("six rooms, carried twice", walk(&six_rooms(), all, 3, &[places / 3, places / 2])),
+        Drive {
+            config: RobustConfig { moves: 3, ..RobustConfig::DEFAULT },
+            ..plain("easy", walk(&easy(), all, 4, &[]))
+        },
+        Drive { known: true, ..plain("known map", walk(&easy(), all, 5, &[])) },
+        Drive {
+            known: true,
+            localise: Some((0, places)),
+            ..plain("known map, localising", walk(&easy(), all, 6, &[places / 2]))
+        },
+        Drive {
+            localise: Some((places / 3, 2 * places / 3)),
+            ..plain("localising in between", walk(&six_rooms(), all, 7, &[places / 2]))
+        },
+    ];
+    // A filter that has to live without room for vertices.
+    drives.push(plain("floor again", walk(&floor(), all, 8, &[])));
+    drives
+}
+
+/// The contents of the filter's section.
+fn saved<const N: usize, const V: usize, const T: usize>(
+    filter: &mut RobustFilter<N, V, T>,
+    room: usize,
+) -> Result<Vec<u8>, SnapshotError> {
+    let mut buffer = vec![0; room];
+    let mut writer = Writer::new(&mut buffer)?;
+    writer.section(FILTER_SECTION, |section| filter.save(section))?;
+    let length = writer.finish()?;
+    buffer.truncate(length);
+    Ok(buffer)
+}
+
+fn section(snapshot: &[u8]) -> Reader<'_> {
+    Snapshot::open(snapshot).unwrap().section(FILTER_SECTION).unwrap()
+}
+
+/// The bytes of the filter's section alone.
+fn contents(snapshot: &[u8]) -> Vec<u8> {
+    // Magic, version, length; tag, length; CRC.
+    snapshot[15..snapshot.len() - 4].to_vec()
+}
+
+fn wrapped(contents: &[u8]) -> Vec<u8> {
+    let mut buffer = vec![0; contents.len() + 19];
+    let mut writer = Writer::new(&mut buffer).unwrap();
+    writer.section(FILTER_SECTION, |section| section.bytes(contents)).unwrap();
+    assert_eq!(writer.finish().unwrap(), buffer.len());
+    buffer
+}

@@ -1,0 +1,164 @@
+//! A mapper in a snapshot: with other sections, and with the next place where it should be.
+
+use toposlam::reference::{self, PaperReference, SONARS, VERTICES};
+use toposlam::snapshot::{Reader, Resume, Snapshot, SnapshotError, Writer};
+use toposlam::wire::map_digest;
+use toposlam::{
+    ConfigError, FaultCounters, Filter, FilterCapacities, Map, Mapper, MapperConfig, Observation, Update,
+    WeightFactors, WorstNgram,
+};
+use toposlam_host::world::{Plan, RobotModel, Simulation};
+
+/// A filter that knows whether places begin sequences, and saves one number.
+struct Notes {
+    begins: Vec<bool>,
+    number: u8,
+    map: Map<VERTICES>,
+    faults: FaultCounters,
+}
+
+impl Filter<VERTICES> for Notes {
+    type Config = u8;
+
+    const UNSTARTED: Self = Self { begins: Vec::new(), number: 0, map: Map::new(), faults: FaultCounters::new() };
+
+    fn capacities(_: &u8) -> FilterCapacities {
+        FilterCapacities { hypotheses: 1, history: 1, ngram_length: 1 }
+    }
+
+    fn start(&mut self, number: u8, _: u64) -> Result<(), ConfigError> {
+        self.number = number;
+        Ok(())
+    }
+
+    fn observe(&mut self, observation: Observation) -> Update {
+        self.begins.push(observation.begins);
+        let factors = WeightFactors { ln_label_q16: 0, ln_consistency_q16: 0, ln_size_q16: 0 };
+        Update { place_index: 0, vertex: 0, is_new: false, consistency_mm: 0, factors, lead_q16: 0, distinct: 1 }
+    }
+
+    fn map(&self) -> &Map<VERTICES> {
+        &self.map
+    }
+
+    fn faults(&self) -> &FaultCounters {
+        &self.faults
+    }
+
+    fn place_probability_q16(&self, _: u8) -> u32 {
+        0
+    }
+
+    fn map_probability_q16(&self) -> u32 {
+        0
+    }
+
+    fn renamed(&self, before: u8) -> Option<u8> {
+        Some(before)
+    }
+
+    fn worst(&self) -> WorstNgram {
+        WorstNgram::NONE
+    }
+
+    fn save(&mut self, writer: &mut Writer<'_>) -> Result<(), SnapshotError> {
+        writer.u8(self.number)
+    }
+
+    fn restore(&mut self, mut reader: Reader<'_>) -> Result<(), SnapshotError> {
+        let number = reader.u8()?;
+        reader.finish()?;
+        self.number = number;
+        Ok(())
+    }
+}
+
+fn started<F: Filter<VERTICES>>(filter: F::Config) -> Box<Mapper<SONARS, VERTICES, F>> {
+    let mut mapper = Box::new(Mapper::new());
+    let config = MapperConfig { geometry: reference::RING, place: reference::PLACE, filter, seed: 1, boot: 0 };
+    mapper.start(&config).unwrap();
+    mapper
+}
+
+/// Drives until the mapper has seen so many places.
+fn drive<F: Filter<VERTICES>>(mapper: &mut Mapper<SONARS, VERTICES, F>, simulation: &mut Simulation, places: usize) {
+    let mut seen = 0;
+    while seen < places {
+        let (frame, truth) = simulation.next().unwrap();
+        let place = mapper.observe(&frame, truth.turn, &FaultCounters::new(), |_| Ok(()));
+        seen += usize::from(place.is_some());
+    }
+}
+
+fn simulation() -> Simulation {
+    Simulation::new(&Plan::built_in("office").unwrap(), RobotModel::default(), 3).unwrap()
+}
+
+#[test]
+fn the_next_place_begins_a_sequence_when_the_robot_may_be_elsewhere() {
+    let mut buffer = [0; 64];
+    let length = started::<Notes>(5).snapshot(&mut buffer).unwrap();
+    for (resume, begins) in [(Resume::Elsewhere, true), (Resume::InPlace, false)] {
+        let mut mapper = started::<Notes>(9);
+        mapper.restore(&buffer[..length], resume).unwrap();
+        assert_eq!(mapper.filter().number, 5);
+        drive(&mut mapper, &mut simulation(), 3);
+        assert_eq!(mapper.filter().begins, [begins, false, false]);
+    }
+    // Refused bytes and a new start leave nothing behind.
+    let mut mapper = started::<Notes>(9);
+    assert_eq!(mapper.restore(&buffer[..length - 1], Resume::Elsewhere), Err(SnapshotError::TooShort));
+    mapper.restore(&buffer[..length], Resume::Elsewhere).unwrap();
+    let config = MapperConfig { geometry: reference::RING, place: reference::PLACE, filter: 9, seed: 1, boot: 0 };
+    mapper.start(&config).unwrap();
+    drive(&mut mapper, &mut simulation(), 1);
+    assert_eq!((mapper.filter().begins.as_slice(), mapper.filter().number), (&[false][..], 9));
+}
+
+#[test]
+fn sections_of_other_stages_are_kept_beside_the_mapper_s_and_skipped() {
+    let mut buffer = [0; 128];
+    let mut writer = Writer::new(&mut buffer).unwrap();
+    writer.section(77, |section| section.u32(4711)).unwrap();
+    started::<Notes>(5).save(&mut writer).unwrap();
+    let length = writer.finish().unwrap();
+    let mut mapper = started::<Notes>(9);
+    mapper.restore(&buffer[..length], Resume::InPlace).unwrap();
+    assert_eq!(mapper.filter().number, 5);
+    assert_eq!(Snapshot::open(&buffer[..length]).unwrap().section(77).unwrap().u32(), Ok(4711));
+    let mut without = [0; 64];
+    let length = Writer::new(&mut without).unwrap().finish().unwrap();
+    assert_eq!(mapper.restore(&without[..length], Resume::InPlace), Err(SnapshotError::Contents));
+}
+
+#[test]
+fn a_robot_that_is_restored_in_the_middle_of_its_drive_ends_with_the_same_map() {
+    let mut buffer = [0; reference::SNAPSHOT_BYTES];
+    let mut simulation = simulation();
+    let mut mapper = started::<reference::Filter>(reference::FILTER);
+    drive(&mut mapper, &mut simulation, 40);
+    let length = mapper.snapshot(&mut buffer).unwrap();
+    // The detector of the restored mapper has heard nothing yet, so it is tried where the robot is between two places.
+    let mut restored = mapper.clone();
+    restored.start(&reference::MAPPER).unwrap();
+    restored.restore(&buffer[..length], Resume::InPlace).unwrap();
+    assert_eq!(map_digest(restored.map()), map_digest(mapper.map()));
+    for (frame, truth) in simulation.take(4000) {
+        for mapper in [&mut mapper, &mut restored] {
+            mapper.observe(&frame, truth.turn, &FaultCounters::new(), |_| Ok(()));
+        }
+    }
+    assert_eq!(map_digest(restored.map()), map_digest(mapper.map()));
+    assert_eq!(restored.filter().observed(), mapper.filter().observed());
+    assert!(restored.filter().observed() > 50);
+}
+
+#[test]
+fn the_paper_s_filter_says_that_it_cannot_be_saved() {
+    let mut buffer = [0; reference::SNAPSHOT_BYTES];
+    let mut mapper = started::<PaperReference>(reference::PAPER_FILTER);
+    assert_eq!(mapper.snapshot(&mut buffer), Err(SnapshotError::Unsupported));
+    let mut robust = started::<reference::Filter>(reference::FILTER);
+    let length = robust.snapshot(&mut buffer).unwrap();
+    assert_eq!(mapper.restore(&buffer[..length], Resume::InPlace), Err(SnapshotError::Unsupported));
+}

@@ -1,0 +1,57 @@
+//! The map survives: whatever the flash is left in, the store has the newest snapshot that was complete, and goes on.
+
+mod boot;
+#[path = "../common/mod.rs"]
+mod common;
+mod cuts;
+mod wear;
+
+use common::environments::floor;
+use common::robot::{Hints, Robot};
+use toposlam::snapshot::{FILTER_SECTION, Snapshot, Writer};
+use toposlam::store::Store;
+use toposlam::wire::map_digest;
+use toposlam::{RobustConfig, reference};
+use toposlam_host::chip::FlashModel;
+
+/// The two last sectors of the reference robot's flash, and pages as an nRF52840 has them.
+type Sectors = FlashModel<1, { 128 * 1024 }>;
+type Pages = FlashModel<4, 4096>;
+
+/// The snapshots of a drive after some places, one with every so many more; each is one that a filter takes.
+fn snapshots(places: usize, count: usize, every: usize) -> Vec<Vec<u8>> {
+    let environment = floor();
+    let hints = Hints { turn: true, degree: true, missing_percent: 10, wrong_percent: 2 };
+    let mut robot = Robot::new(&environment, hints, 11);
+    let mut filter = Box::new(reference::Filter::new());
+    filter.start(RobustConfig::DEFAULT, 1).unwrap();
+    let mut restored = Box::new(reference::Filter::new());
+    let mut all = Vec::new();
+    for _ in 0..places {
+        filter.observe(robot.step());
+    }
+    for _ in 0..count {
+        for _ in 0..every {
+            filter.observe(robot.step());
+            filter.polish();
+        }
+        let mut buffer = vec![0; reference::SNAPSHOT_BYTES];
+        let mut writer = Writer::new(&mut buffer).unwrap();
+        writer.section(FILTER_SECTION, |section| filter.save(section)).unwrap();
+        let length = writer.finish().unwrap();
+        buffer.truncate(length);
+        let section = Snapshot::open(&buffer).unwrap().section(FILTER_SECTION).unwrap();
+        restored.restore(section).unwrap();
+        assert_eq!(map_digest(restored.map()), map_digest(filter.map()));
+        all.push(buffer);
+    }
+    all
+}
+
+/// The newest snapshot of a store.
+fn newest<FLASH: embedded_storage::nor_flash::NorFlash>(store: &mut Store<FLASH>) -> Option<Vec<u8>> {
+    let mut buffer = vec![0; reference::SNAPSHOT_BYTES];
+    let kept = store.newest(&mut buffer).unwrap()?;
+    buffer.truncate(kept.length);
+    Some(buffer)
+}

@@ -1,0 +1,217 @@
+//! The robust filter in a snapshot: what cannot be computed again from the places and the paths.
+//!
+//! A hypothesis is its path and the counts of what left the record; its map, counts and evidence are computed anew. So that
+//! the filter that goes on and the one that is restored are the same, bit for bit, saving computes them anew as well.
+
+mod hypothesis;
+mod parts;
+
+use super::{RobustConfig, RobustFilter, worst};
+use crate::FaultCounters;
+use crate::snapshot::{FRAME_BYTES, Reader, SnapshotError, Writer};
+use parts::{TALLY_BYTES, path_bytes, row_bytes};
+
+/// What the contents of the filter's section begin with.
+const ROBUST: u8 = 1;
+
+/// The scale of the noise is within these, in steps².
+const SCALES: core::ops::RangeInclusive<f32> = 0.1..=1e6;
+
+/// What is neither record, map nor hypothesis.
+#[derive(Clone, Copy)]
+struct Head {
+    config: RobustConfig,
+    seed: u64,
+    observed: u32,
+    polished: u32,
+    localise_only: bool,
+    scale: f32,
+}
+
+const HEAD_BYTES: usize = 4 + 10 + 8 + 4 + 4 + 1 + 4;
+
+impl<const N: usize, const V: usize, const HISTORY: usize> RobustFilter<N, V, HISTORY> {
+    /// The largest snapshot of this filter alone, in bytes: with `N` hypotheses of `V` vertices and a full history.
+    pub const SNAPSHOT_BYTES: usize = {
+        let counted = V * (TALLY_BYTES + row_bytes(V));
+        let told = 1 + V * (11 + row_bytes(V)) + 4 + 1 + V + path_bytes(V, HISTORY);
+        let hypothesis = hypothesis::FIXED_BYTES + path_bytes(V, HISTORY) + counted;
+        FRAME_BYTES + HEAD_BYTES + 2 + 3 * HISTORY + told + 1 + hypothesis::KEPT_BYTES + counted + N * hypothesis
+    };
+
+    /// Writes what the filter knows: settings, places, what it told last, and the hypotheses, the best first, as many as there is
+    /// room for. A buffer of [`RobustFilter::SNAPSHOT_BYTES`] has room for all, and the restored filter then goes on as this one
+    /// does, bit for bit. Cost: one pass over the history for each hypothesis.
+    ///
+    /// # Errors
+    /// [`SnapshotError::Full`] when there is no room for the best hypothesis.
+    pub fn save(&mut self, writer: &mut Writer<'_>) -> Result<(), SnapshotError> {
+        self.make_canonical();
+        self.head().save::<V, HISTORY>(writer)?;
+        self.record.save(writer)?;
+        self.save_told(writer)?;
+        let count_at = writer.mark();
+        writer.u8(0)?;
+        let len = self.record.len();
+        if self.localise_only
+            && let Some(best) = self.beam.get(0)
+        {
+            best.save_kept(writer)?;
+        }
+        let mut count = 0_u8;
+        for hypothesis in self.beam.iter() {
+            let mark = writer.mark();
+            match hypothesis.save(writer, len, self.localise_only) {
+                Ok(()) => count = count.saturating_add(1),
+                Err(SnapshotError::Full) if count > 0 => {
+                    writer.rewind(mark);
+                    break;
+                }
+                Err(error) => return Err(error),
+            }
+        }
+        writer.overwrite(count_at, &[count]);
+        Ok(())
+    }
+
+    /// Goes on with what was written by [`RobustFilter::save`], settings and seed included; faults are counted from 0.
+    ///
+    /// Everything is read and checked before anything is changed. Cost: two passes over the bytes, and one over the history for
+    /// each hypothesis.
+    ///
+    /// # Errors
+    /// [`SnapshotError::Capacities`] for another kind of filter or other capacities, [`SnapshotError::TooShort`], or
+    /// [`SnapshotError::Contents`]; the filter then goes on as it was.
+    pub fn restore(&mut self, reader: Reader<'_>) -> Result<(), SnapshotError> {
+        self.read(reader, false)?;
+        self.read(reader, true)
+    }
+
+    /// Reads a snapshot, and takes it over if it is to be `kept`; else only the drafts are written to.
+    fn read(&mut self, mut from: Reader<'_>, kept: bool) -> Result<(), SnapshotError> {
+        let head = Head::read::<N, V, HISTORY>(&mut from)?;
+        let len = usize::from(from.u16()?);
+        if len > HISTORY || (head.observed as usize) < len {
+            return Err(SnapshotError::Contents);
+        }
+        if kept {
+            self.take_head(&head);
+        }
+        self.record.read(&mut from, len, kept)?;
+        let told_vertices = self.read_told(&mut from, len, kept)?;
+        let count = from.u8()?;
+        if count > head.config.hypotheses {
+            return Err(SnapshotError::Contents);
+        }
+        self.draft.clear();
+        if head.localise_only && count > 0 {
+            self.draft.read_kept(&mut from)?;
+            if self.draft.vertices != told_vertices {
+                return Err(SnapshotError::Contents);
+            }
+        }
+        for _ in 0..count {
+            self.draft.read(&mut from, len, head.localise_only)?;
+            if kept {
+                if !head.localise_only {
+                    self.draft.recount(&self.prices, &self.record);
+                }
+                self.beam.append(&self.draft);
+            }
+        }
+        if kept {
+            self.worst = worst::worst_ngram(&self.record, &self.map, self.names.path());
+        }
+        from.finish()
+    }
+
+    /// Brings the filter into the state that its snapshot gives.
+    fn make_canonical(&mut self) {
+        if self.localise_only {
+            // The map is kept as it is, so all have that of the best one.
+            if let Some(best) = self.beam.get(0) {
+                self.draft.clone_from(best);
+                let kept = &self.draft;
+                self.beam.each(|hypothesis| hypothesis.keep_map_of(kept));
+            }
+        } else {
+            let (prices, record) = (&self.prices, &self.record);
+            self.beam.each(|hypothesis| hypothesis.recount(prices, record));
+            self.beam.sort();
+        }
+    }
+
+    fn head(&self) -> Head {
+        Head {
+            config: self.config,
+            seed: self.seed,
+            observed: self.observed,
+            polished: self.polished,
+            localise_only: self.localise_only,
+            scale: self.prices.scale,
+        }
+    }
+
+    fn take_head(&mut self, head: &Head) {
+        self.config = head.config;
+        self.seed = head.seed;
+        self.observed = head.observed;
+        self.polished = head.polished;
+        self.localise_only = head.localise_only;
+        self.prices.configure(&head.config);
+        self.prices.set_scale(head.scale);
+        self.beam.begin_empty();
+        self.faults = FaultCounters::new();
+    }
+}
+
+impl Head {
+    fn save<const V: usize, const HISTORY: usize>(&self, writer: &mut Writer<'_>) -> Result<(), SnapshotError> {
+        writer.u8(ROBUST)?;
+        writer.u8(V as u8)?;
+        writer.u16(HISTORY as u16)?;
+        writer.u8(self.config.hypotheses)?;
+        writer.u16(self.config.noise_mm)?;
+        writer.u16(self.config.resolution_mm)?;
+        writer.u8(self.config.moves)?;
+        writer.u16(self.config.wrong_turn_permille)?;
+        writer.u16(self.config.wrong_degree_permille)?;
+        writer.u64(self.seed)?;
+        writer.u32(self.observed)?;
+        writer.u32(self.polished)?;
+        writer.u8(self.localise_only.into())?;
+        writer.f32(self.scale)
+    }
+
+    fn read<const N: usize, const V: usize, const HISTORY: usize>(
+        from: &mut Reader<'_>,
+    ) -> Result<Self, SnapshotError> {
+        let capacities = (from.u8()?, usize::from(from.u8()?), usize::from(from.u16()?));
+        if capacities != (ROBUST, V, HISTORY) {
+            return Err(SnapshotError::Capacities);
+        }
+        let config = RobustConfig {
+            hypotheses: from.u8()?,
+            noise_mm: from.u16()?,
+            resolution_mm: from.u16()?,
+            moves: from.u8()?,
+            wrong_turn_permille: from.u16()?,
+            wrong_degree_permille: from.u16()?,
+        };
+        if usize::from(config.hypotheses) > N {
+            return Err(SnapshotError::Capacities);
+        }
+        config.check(N).map_err(|_| SnapshotError::Contents)?;
+        let (seed, observed, polished) = (from.u64()?, from.u32()?, from.u32()?);
+        let localise_only = match from.u8()? {
+            0 => false,
+            1 => true,
+            _ => return Err(SnapshotError::Contents),
+        };
+        let scale = from.f32()?;
+        if !SCALES.contains(&scale) {
+            return Err(SnapshotError::Contents);
+        }
+        Ok(Self { config, seed, observed, polished, localise_only, scale })
+    }
+}

@@ -1,0 +1,215 @@
+//! A snapshot: what a robot has learned, as one byte string for a flash or a line (`docs/snapshot.md` is the specification).
+//!
+//! ```text
+//! magic "TSLM" | version u16 | length u32 | sections … | CRC-32
+//!                                           tag u8 | length u32 | contents
+//! ```
+//!
+//! All numbers are little endian, floats are their bits, and the length is that of the whole. A section that a reader does not
+//! know is skipped. Each stage writes and reads its own section; the filter's takes all the room that is left, so it comes last.
+//!
+//! ```
+//! use toposlam::snapshot::{Snapshot, Writer};
+//!
+//! const ODOMETER: u8 = 200;
+//! let mut buffer = [0; 64];
+//! let mut writer = Writer::new(&mut buffer)?;
+//! writer.section(ODOMETER, |section| section.u32(1234))?;
+//! let length = writer.finish()?;
+//!
+//! let snapshot = Snapshot::open(&buffer[..length])?;
+//! let mut section = snapshot.section(ODOMETER).unwrap();
+//! assert_eq!(section.u32()?, 1234);
+//! section.finish()?;
+//! # Ok::<(), toposlam::snapshot::SnapshotError>(())
+//! ```
+
+mod reader;
+mod writer;
+
+pub use reader::{Reader, Snapshot};
+pub use writer::Writer;
+
+use core::fmt;
+use crc::{CRC_32_ISO_HDLC, Crc, NoTable};
+
+/// The version of the layout; a snapshot of another one is refused.
+pub const SNAPSHOT_VERSION: u16 = 1;
+
+/// The tag of the filter's section.
+pub const FILTER_SECTION: u8 = 1;
+
+/// What every snapshot begins with.
+const MAGIC: [u8; 4] = *b"TSLM";
+
+/// Magic, version and length.
+const HEADER_BYTES: usize = 10;
+/// Tag and length of a section.
+const SECTION_HEADER_BYTES: usize = 5;
+const CRC_BYTES: usize = 4;
+
+/// What a snapshot with one section takes beside the contents of the section.
+pub(crate) const FRAME_BYTES: usize = HEADER_BYTES + SECTION_HEADER_BYTES + CRC_BYTES;
+
+/// CRC-32 ISO-HDLC, as on the wire, bit by bit: a snapshot is seldom, and a table takes 1 KiB of flash.
+static CRC: Crc<u32, NoTable> = Crc::<u32, NoTable>::new(&CRC_32_ISO_HDLC);
+
+/// Why a snapshot could not be written or read.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum SnapshotError {
+    /// The buffer has no room for it.
+    Full,
+    /// Bytes are missing at its end.
+    TooShort,
+    /// It is not a snapshot, or its CRC is wrong.
+    Corrupt,
+    /// It has another version of the layout.
+    Version {
+        /// The version it has.
+        found: u16,
+    },
+    /// It is of a filter of another kind or with other capacities.
+    Capacities,
+    /// It says something that no filter says.
+    Contents,
+    /// The filter cannot be saved.
+    Unsupported,
+}
+
+impl fmt::Display for SnapshotError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Full => f.write_str("the buffer has no room for a snapshot"),
+            Self::TooShort => f.write_str("the snapshot is cut short"),
+            Self::Corrupt => f.write_str("the bytes are no snapshot, or its CRC is wrong"),
+            Self::Version { found } => write!(f, "the snapshot has version {found}, not {SNAPSHOT_VERSION}"),
+            Self::Capacities => f.write_str("the snapshot is of a filter with other capacities"),
+            Self::Contents => f.write_str("the snapshot says what no filter says"),
+            Self::Unsupported => f.write_str("the filter cannot be saved"),
+        }
+    }
+}
+
+impl core::error::Error for SnapshotError {}
+
+/// Where the robot is when it goes on with a snapshot.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Resume {
+    /// Where it was when the snapshot was made: the next place follows the last one.
+    InPlace,
+    /// Anywhere: it may have been carried or driven since, so that the next place begins a sequence.
+    Elsewhere,
+}
+
+/// When snapshots are made.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct SnapshotPolicy {
+    /// A snapshot with every so many places; 0 for none at all. Default 25.
+    pub every_places: u16,
+}
+
+impl SnapshotPolicy {
+    /// The defaults.
+    pub const DEFAULT: Self = Self { every_places: 25 };
+
+    /// Whether one is due after the place of this number, counted from 0.
+    pub const fn is_due(&self, place_index: u32) -> bool {
+        match place_index.wrapping_add(1).checked_rem(self.every_places as u32) {
+            Some(rest) => rest == 0,
+            None => false,
+        }
+    }
+}
+
+impl Default for SnapshotPolicy {
+    fn default() -> Self {
+        Self::DEFAULT
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn two_sections(buffer: &mut [u8]) -> Result<usize, SnapshotError> {
+        let mut writer = Writer::new(buffer)?;
+        writer.section(7, |section| section.u16(0x0102))?;
+        writer.section(9, |section| {
+            section.u8(1)?;
+            section.u64(2)?;
+            section.f32(-0.5)
+        })?;
+        writer.finish()
+    }
+
+    #[test]
+    fn sections_come_back_by_their_tags_and_unknown_ones_are_none() {
+        let mut buffer = [0xAA; 100];
+        let length = two_sections(&mut buffer).unwrap();
+        assert_eq!(length, HEADER_BYTES + 2 * SECTION_HEADER_BYTES + 2 + 13 + CRC_BYTES);
+        // What lies behind the snapshot does not matter.
+        for bytes in [&buffer[..length], &buffer[..]] {
+            let snapshot = Snapshot::open(bytes).unwrap();
+            let mut nine = snapshot.section(9).unwrap();
+            assert_eq!((nine.u8(), nine.u64(), nine.f32()), (Ok(1), Ok(2), Ok(-0.5)));
+            assert_eq!(nine.finish(), Ok(()));
+            let mut seven = snapshot.section(7).unwrap();
+            assert_eq!(seven.finish(), Err(SnapshotError::Contents), "nothing may be left over");
+            assert_eq!((seven.u16(), seven.u8()), (Ok(0x0102), Err(SnapshotError::TooShort)));
+            assert!(snapshot.section(8).is_none());
+        }
+    }
+
+    #[test]
+    fn a_buffer_that_is_too_small_is_full_and_one_that_just_fits_is_not() {
+        let mut buffer = [0; 100];
+        let length = two_sections(&mut buffer).unwrap();
+        for room in 0..length {
+            assert_eq!(two_sections(&mut buffer[..room]), Err(SnapshotError::Full), "{room}");
+        }
+        assert_eq!(two_sections(&mut buffer[..length]), Ok(length));
+    }
+
+    #[test]
+    fn a_section_that_has_no_room_leaves_the_others() {
+        let mut buffer = [0; HEADER_BYTES + SECTION_HEADER_BYTES + 1 + CRC_BYTES];
+        let mut writer = Writer::new(&mut buffer).unwrap();
+        writer.section(1, |section| section.u8(5)).unwrap();
+        assert_eq!(writer.section(2, |_| Ok(())), Err(SnapshotError::Full));
+        let length = writer.finish().unwrap();
+        assert_eq!(Snapshot::open(&buffer[..length]).unwrap().section(1).unwrap().u8(), Ok(5));
+    }
+
+    #[test]
+    fn every_bit_and_every_missing_byte_is_noticed() {
+        let mut buffer = [0; 100];
+        let length = two_sections(&mut buffer).unwrap();
+        for bit in 0..8 * length {
+            let mut damaged = buffer;
+            damaged[bit / 8] ^= 1 << (bit % 8);
+            let opened = Snapshot::open(&damaged[..length]);
+            assert!(matches!(opened, Err(SnapshotError::Corrupt | SnapshotError::TooShort)), "{bit}");
+        }
+        for kept in 0..length {
+            assert_eq!(Snapshot::open(&buffer[..kept]).err(), Some(SnapshotError::TooShort), "{kept}");
+        }
+    }
+
+    #[test]
+    fn another_version_is_refused_by_its_number() {
+        let mut buffer = [0; 100];
+        let length = two_sections(&mut buffer).unwrap();
+        buffer[4] = 2;
+        let crc = CRC.checksum(&buffer[..length - CRC_BYTES]);
+        buffer[length - CRC_BYTES..length].copy_from_slice(&crc.to_le_bytes());
+        assert_eq!(Snapshot::open(&buffer[..length]).err(), Some(SnapshotError::Version { found: 2 }));
+    }
+
+    #[test]
+    fn a_snapshot_is_due_with_every_so_many_places() {
+        let policy = SnapshotPolicy { every_places: 3 };
+        assert!((0..7).map(|place| policy.is_due(place)).eq([false, false, true, false, false, true, false]));
+        assert!(!(0..7).any(|place| SnapshotPolicy { every_places: 0 }.is_due(place)));
+    }
+}

@@ -1,0 +1,128 @@
+//! One half of the store as a queue of `sequential-storage`, whose futures are done as soon as they are asked: the flash blocks.
+
+use core::future::Future;
+use core::ops::Range;
+use core::pin::pin;
+use core::task::{Context, Poll, Waker};
+
+use embedded_storage::nor_flash::{ErrorType, NorFlash, NorFlashError, ReadNorFlash};
+use embedded_storage_async::nor_flash as asynchronous;
+use sequential_storage::cache::{Cache, Uncached};
+use sequential_storage::queue::{QueueConfig, QueueStorage};
+
+use super::StoreError;
+use super::item::{ITEM_BYTES, Item, PIECE_BYTES, Packed};
+
+/// A blocking flash behind the asynchronous traits.
+struct Blocking<'a, FLASH>(&'a mut FLASH);
+
+impl<FLASH: ErrorType> ErrorType for Blocking<'_, FLASH> {
+    type Error = FLASH::Error;
+}
+
+impl<FLASH: ReadNorFlash> asynchronous::ReadNorFlash for Blocking<'_, FLASH> {
+    const READ_SIZE: usize = FLASH::READ_SIZE;
+
+    async fn read(&mut self, offset: u32, bytes: &mut [u8]) -> Result<(), Self::Error> {
+        self.0.read(offset, bytes)
+    }
+
+    fn capacity(&self) -> usize {
+        self.0.capacity()
+    }
+}
+
+impl<FLASH: NorFlash> asynchronous::NorFlash for Blocking<'_, FLASH> {
+    const WRITE_SIZE: usize = FLASH::WRITE_SIZE;
+    const ERASE_SIZE: usize = FLASH::ERASE_SIZE;
+
+    async fn erase(&mut self, from: u32, to: u32) -> Result<(), Self::Error> {
+        self.0.erase(from, to)
+    }
+
+    async fn write(&mut self, offset: u32, bytes: &[u8]) -> Result<(), Self::Error> {
+        self.0.write(offset, bytes)
+    }
+}
+
+/// The outcome of a future that does not wait.
+fn now<T>(future: impl Future<Output = T>) -> Result<T, StoreError> {
+    match pin!(future).poll(&mut Context::from_waker(Waker::noop())) {
+        Poll::Ready(outcome) => Ok(outcome),
+        Poll::Pending => Err(StoreError::NotReady),
+    }
+}
+
+pub(super) fn flash_error(error: impl NorFlashError) -> StoreError {
+    StoreError::Flash(error.kind())
+}
+
+/// Whether an item found room.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Push {
+    Done,
+    Full,
+}
+
+/// A half of the store.
+pub(super) struct Log<'a, FLASH: NorFlash> {
+    queue: QueueStorage<Blocking<'a, FLASH>, Cache<Uncached, Uncached, Uncached>>,
+}
+
+impl<'a, FLASH: NorFlash> Log<'a, FLASH> {
+    /// The unit that the queue counts in.
+    const WORD: usize = if FLASH::WRITE_SIZE > FLASH::READ_SIZE { FLASH::WRITE_SIZE } else { FLASH::READ_SIZE };
+    /// What an item takes, its header of 8 bytes included.
+    const ITEM: usize = 8_usize.next_multiple_of(Self::WORD) + ITEM_BYTES.next_multiple_of(Self::WORD);
+    /// How many of the largest items fit an erasable unit, beside its two marks.
+    pub(super) const ITEMS_IN_UNIT: usize = FLASH::ERASE_SIZE.saturating_sub(2 * Self::WORD) / Self::ITEM;
+
+    pub(super) fn new(flash: &'a mut FLASH, range: Range<u32>) -> Result<Self, StoreError> {
+        let config = QueueConfig::try_new(range).map_err(|_| StoreError::Range)?;
+        Ok(Self { queue: QueueStorage::new(Blocking(flash), config, Cache::new_uncached()) })
+    }
+
+    /// Appends an item.
+    pub(super) fn push(&mut self, item: &Item<'_>) -> Result<Push, StoreError> {
+        let mut packed = Packed([0; ITEM_BYTES]);
+        let length = item.pack(&mut packed);
+        let bytes = packed.0.get(..length).unwrap_or(&[]);
+        match now(self.queue.push(bytes, false))? {
+            Ok(()) => Ok(Push::Done),
+            Err(sequential_storage::Error::Storage { value, .. }) => Err(flash_error(value)),
+            // Full, or in a state that only an erase mends.
+            Err(_) => Ok(Push::Full),
+        }
+    }
+
+    /// Whether there is room for a snapshot but for what the ends of pages waste.
+    pub(super) fn may_have_room(&mut self, length: usize) -> Result<bool, StoreError> {
+        match now(self.queue.space_left())? {
+            Ok(left) => Ok(left as usize >= length / PIECE_BYTES * Self::ITEM + length % PIECE_BYTES),
+            Err(sequential_storage::Error::Storage { value, .. }) => Err(flash_error(value)),
+            Err(_) => Ok(false),
+        }
+    }
+
+    /// Shows every item, the oldest first, up to one that cannot be read.
+    pub(super) fn each(&mut self, mut visit: impl FnMut(Item<'_>)) -> Result<(), StoreError> {
+        let mut packed = Packed([0; ITEM_BYTES]);
+        let mut items = match now(self.queue.iter())? {
+            Ok(items) => items,
+            Err(sequential_storage::Error::Storage { value, .. }) => return Err(flash_error(value)),
+            Err(_) => return Ok(()),
+        };
+        loop {
+            match now(items.next(&mut packed.0))? {
+                Ok(Some(entry)) => {
+                    if let Some(item) = Item::unpack(&entry) {
+                        visit(item);
+                    }
+                }
+                Ok(None) => return Ok(()),
+                Err(sequential_storage::Error::Storage { value, .. }) => return Err(flash_error(value)),
+                Err(_) => return Ok(()),
+            }
+        }
+    }
+}

@@ -1,0 +1,372 @@
+//! Snapshots in flash: wear-levelled, and safe against a power cut at any time.
+//!
+//! The range of flash is two halves. What is stored goes behind what one half has already, and only when that is full the
+//! other half is erased and goes on. **The half with the newest complete snapshot is never erased**, so a power cut loses at
+//! most the snapshot that was being stored, whatever state it leaves the flash in. Each half is a queue of the crate
+//! `sequential-storage`; a snapshot is in pieces of 249 bytes there, and counts when its last piece is there.
+//!
+//! ```
+//! # use embedded_storage::nor_flash::NorFlash;
+//! use toposlam::store::{Store, StoreError};
+//!
+//! fn keep<FLASH: NorFlash>(flash: FLASH, snapshot: &[u8], buffer: &mut [u8]) -> Result<(), StoreError> {
+//!     // The last 256 KiB of 1 MiB.
+//!     let mut store = Store::mount(flash, 0xC_0000..0x10_0000)?;
+//!     let starts = store.count_start()?;
+//!     store.save(snapshot)?;
+//!     if let Some(kept) = store.newest(buffer)? {
+//!         assert_eq!(buffer.get(..kept.length), Some(snapshot));
+//!     }
+//!     # let _ = starts;
+//!     Ok(())
+//! }
+//! ```
+
+#[cfg(feature = "wire")]
+mod boot;
+mod item;
+mod log;
+
+#[cfg(feature = "wire")]
+pub use boot::{BootOutcome, BootPolicy, BootReport, boot};
+
+use core::fmt;
+use core::ops::Range;
+use embedded_storage::nor_flash::{NorFlash, NorFlashErrorKind};
+use item::{Assembly, Item, PIECE_BYTES};
+use log::{Log, Push};
+
+/// Why something could not be stored or read.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum StoreError {
+    /// The range is not an even number of the flash's erasable units, or not in the flash, or the units are smaller than 512 bytes.
+    Range,
+    /// The flash reported an error.
+    Flash(NorFlashErrorKind),
+    /// The snapshot is larger than [`Store::largest`].
+    TooLarge,
+    /// What was stored reads otherwise: the flash is worn out or damaged.
+    Damaged,
+    /// The flash said that it is not ready, which a blocking one never does.
+    NotReady,
+}
+
+impl fmt::Display for StoreError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Range => "the range of flash is no even number of erasable units",
+            Self::Flash(NorFlashErrorKind::NotAligned) => "the flash wants another alignment",
+            Self::Flash(NorFlashErrorKind::OutOfBounds) => "the range is beyond the flash",
+            Self::Flash(_) => "the flash reported an error",
+            Self::TooLarge => "the snapshot is larger than half of the range",
+            Self::Damaged => "the flash does not keep what is stored",
+            Self::NotReady => "the flash is not ready",
+        })
+    }
+}
+
+impl core::error::Error for StoreError {}
+
+/// A snapshot in the store.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Kept {
+    /// Later snapshots have larger numbers.
+    pub serial: u32,
+    /// Its length in bytes.
+    pub length: usize,
+}
+
+/// What one half of the range holds.
+#[derive(Clone, Copy, Debug, Default)]
+struct Survey {
+    /// Whether it begins with a count of starts, as it does after it was erased: else an erase was cut short.
+    is_sound: bool,
+    /// The largest number in it.
+    serial: u32,
+    /// The newest complete snapshot below the number that was asked for.
+    newest: Option<Kept>,
+    starts: u32,
+}
+
+/// Snapshots in a range of flash. Memory: some words beside the flash's own, and some 500 bytes of stack.
+#[derive(Clone, Debug)]
+pub struct Store<FLASH> {
+    flash: FLASH,
+    halves: [Range<u32>; 2],
+    /// The half to which is written, if there is one that can be.
+    current: Option<usize>,
+    /// The half with the newest complete snapshot.
+    newest: Option<usize>,
+    /// The last number that was given.
+    serial: u32,
+    starts: u32,
+}
+
+impl<FLASH: NorFlash> Store<FLASH> {
+    /// Looks through a range of flash for what was stored before. Erases a page that a power cut left half erased.
+    ///
+    /// # Errors
+    /// [`StoreError::Range`], [`StoreError::Flash`], [`StoreError::NotReady`].
+    pub fn mount(flash: FLASH, range: Range<u32>) -> Result<Self, StoreError> {
+        let unit = FLASH::ERASE_SIZE as u32;
+        let length = range.end.saturating_sub(range.start);
+        let is_whole = |address: u32| address.checked_rem(unit) == Some(0);
+        let is_fit = is_whole(range.start)
+            && is_whole(length / 2)
+            && length.is_multiple_of(2)
+            && length > 0
+            && range.end as usize <= flash.capacity()
+            && unit >= 512;
+        if !is_fit {
+            return Err(StoreError::Range);
+        }
+        let middle = range.start + length / 2;
+        let halves = [range.start..middle, middle..range.end];
+        let mut store = Self { flash, halves, current: None, newest: None, serial: 0, starts: 0 };
+        let (mut last, mut newest) = (0, None);
+        for half in 0..2 {
+            let survey = store.survey(half, u32::MAX)?;
+            store.serial = store.serial.max(survey.serial);
+            store.starts = store.starts.max(survey.starts);
+            if survey.is_sound && survey.serial >= last {
+                (store.current, last) = (Some(half), survey.serial);
+            }
+            if survey.newest > newest {
+                (store.newest, newest) = (Some(half), survey.newest);
+            }
+        }
+        Ok(store)
+    }
+
+    /// The largest snapshot that fits, in bytes.
+    pub fn largest(&self) -> usize {
+        let [half, _] = &self.halves;
+        let units = (half.end.saturating_sub(half.start) as usize).checked_div(FLASH::ERASE_SIZE).unwrap_or(0);
+        // Two pieces less for the count of starts and the end.
+        (units * Log::<FLASH>::ITEMS_IN_UNIT).saturating_sub(2) * PIECE_BYTES
+    }
+
+    /// Stores a snapshot, or any bytes, and reads them back. Cost: some 8 bytes more than the snapshot for every 249 bytes are
+    /// written; when a half is full, one erase.
+    ///
+    /// # Errors
+    /// [`StoreError`]; the snapshots before are still there.
+    pub fn save(&mut self, snapshot: &[u8]) -> Result<(), StoreError> {
+        if snapshot.len() > self.largest() {
+            return Err(StoreError::TooLarge);
+        }
+        if let Some(half) = self.current {
+            match self.append(half, snapshot) {
+                Ok(true) => return Ok(()),
+                // A half that is full, or that the flash refuses: a power cut may have left words that are written in part.
+                Ok(false) | Err(StoreError::Flash(_)) => {}
+                Err(error) => return Err(error),
+            }
+        }
+        let half = self.change_halves()?;
+        if self.append(half, snapshot)? { Ok(()) } else { Err(StoreError::Damaged) }
+    }
+
+    /// Reads the newest snapshot that fits a buffer; `None` when there is none.
+    ///
+    /// # Errors
+    /// [`StoreError::Flash`], [`StoreError::NotReady`].
+    pub fn newest(&mut self, buffer: &mut [u8]) -> Result<Option<Kept>, StoreError> {
+        self.newest_below(u32::MAX, buffer)
+    }
+
+    /// Reads the snapshot that was stored before another one, as [`Store::newest`] does.
+    ///
+    /// # Errors
+    /// As [`Store::newest`].
+    pub fn before(&mut self, kept: Kept, buffer: &mut [u8]) -> Result<Option<Kept>, StoreError> {
+        self.newest_below(kept.serial, buffer)
+    }
+
+    /// Counts a start of the robot, and tells how many there were.
+    ///
+    /// The number is larger than at the start before, unless the power was cut between the erase of a half and its first
+    /// write while the other half was full.
+    ///
+    /// # Errors
+    /// [`StoreError::Flash`], [`StoreError::NotReady`], [`StoreError::Damaged`].
+    pub fn count_start(&mut self) -> Result<u32, StoreError> {
+        self.starts = self.starts.saturating_add(1);
+        if let Some(half) = self.current {
+            match self.push_starts(half) {
+                Ok(Push::Done) => return Ok(self.starts),
+                Ok(Push::Full) | Err(StoreError::Flash(_)) => {}
+                Err(error) => return Err(error),
+            }
+        }
+        self.change_halves()?;
+        Ok(self.starts)
+    }
+
+    /// How many starts were counted.
+    pub fn starts(&self) -> u32 {
+        self.starts
+    }
+
+    /// Forgets all snapshots; the starts stay counted.
+    ///
+    /// # Errors
+    /// As [`Store::count_start`].
+    pub fn erase(&mut self) -> Result<(), StoreError> {
+        self.newest = None;
+        for _ in 0..2 {
+            self.change_halves()?;
+        }
+        Ok(())
+    }
+
+    /// The flash. What is written to the store's range goes unnoticed until the store is mounted again.
+    pub fn flash_mut(&mut self) -> &mut FLASH {
+        &mut self.flash
+    }
+
+    /// Gives the flash back.
+    pub fn release(self) -> FLASH {
+        self.flash
+    }
+
+    fn log(&mut self, half: usize) -> Result<Log<'_, FLASH>, StoreError> {
+        let range = self.halves.get(half).cloned().ok_or(StoreError::Range)?;
+        Log::new(&mut self.flash, range)
+    }
+
+    fn next_serial(&mut self) -> u32 {
+        self.serial = self.serial.saturating_add(1);
+        self.serial
+    }
+
+    /// Looks through a half, for complete snapshots below a number.
+    fn survey(&mut self, half: usize, below: u32) -> Result<Survey, StoreError> {
+        let mut survey = Survey::default();
+        let mut assembly = Assembly::NONE;
+        let mut is_first = true;
+        self.log(half)?.each(|item| {
+            survey.serial = survey.serial.max(item.serial());
+            if let Item::Starts { starts, .. } = item {
+                survey.is_sound |= is_first;
+                survey.starts = survey.starts.max(starts);
+            }
+            is_first = false;
+            if let Some((serial, length)) = assembly.take(&item)
+                && serial < below
+            {
+                survey.newest = survey.newest.max(Some(Kept { serial, length }));
+            }
+        })?;
+        Ok(survey)
+    }
+
+    fn newest_below(&mut self, below: u32, buffer: &mut [u8]) -> Result<Option<Kept>, StoreError> {
+        let mut below = below;
+        loop {
+            let mut found = None;
+            for half in 0..2 {
+                let newest = self.survey(half, below)?.newest;
+                if newest > found.map(|(kept, _)| kept) {
+                    found = newest.map(|kept| (kept, half));
+                }
+            }
+            let Some((kept, half)) = found else { return Ok(None) };
+            if let Some(room) = buffer.get_mut(..kept.length)
+                && self.read(half, kept, room)?
+            {
+                return Ok(Some(kept));
+            }
+            below = kept.serial;
+        }
+    }
+
+    /// Copies a snapshot; tells whether all of it was there.
+    fn read(&mut self, half: usize, kept: Kept, to: &mut [u8]) -> Result<bool, StoreError> {
+        let mut is_complete = false;
+        let mut assembly = Assembly::NONE;
+        self.log(half)?.each(|item| {
+            if item.serial() != kept.serial {
+                return;
+            }
+            if let Item::Piece { index, bytes, .. } = item {
+                let begin = usize::from(index) * PIECE_BYTES;
+                to.iter_mut().skip(begin).zip(bytes).for_each(|(to, &byte)| *to = byte);
+            }
+            is_complete |= assembly.take(&item).is_some();
+        })?;
+        Ok(is_complete)
+    }
+
+    /// Whether a snapshot reads as it should.
+    fn is_kept(&mut self, half: usize, serial: u32, snapshot: &[u8]) -> Result<bool, StoreError> {
+        let mut is_same = true;
+        let mut is_complete = false;
+        let mut assembly = Assembly::NONE;
+        self.log(half)?.each(|item| {
+            if item.serial() != serial {
+                return;
+            }
+            if let Item::Piece { index, bytes, .. } = item {
+                is_same &= snapshot.chunks(PIECE_BYTES).nth(index.into()) == Some(bytes);
+            }
+            is_complete |= assembly.take(&item).is_some_and(|(_, length)| length == snapshot.len());
+        })?;
+        Ok(is_same && is_complete)
+    }
+
+    /// Stores a snapshot behind what a half has; tells whether it had room for it and keeps it.
+    fn append(&mut self, half: usize, snapshot: &[u8]) -> Result<bool, StoreError> {
+        let serial = self.next_serial();
+        let mut log = self.log(half)?;
+        if !log.may_have_room(snapshot.len())? {
+            return Ok(false);
+        }
+        let mut pieces = 0;
+        for (index, bytes) in (0..).zip(snapshot.chunks(PIECE_BYTES)) {
+            if log.push(&Item::Piece { serial, index, bytes })? == Push::Full {
+                return Ok(false);
+            }
+            pieces = index + 1;
+        }
+        let end = Item::End { serial, pieces, length: snapshot.len() as u32 };
+        if log.push(&end)? == Push::Full || !self.is_kept(half, serial, snapshot)? {
+            return Ok(false);
+        }
+        self.newest = Some(half);
+        Ok(true)
+    }
+
+    fn push_starts(&mut self, half: usize) -> Result<Push, StoreError> {
+        let (serial, starts) = (self.next_serial(), self.starts);
+        self.log(half)?.push(&Item::Starts { serial, starts })
+    }
+
+    /// Erases the half that does not have the newest snapshot, and writes there from now on.
+    fn change_halves(&mut self) -> Result<usize, StoreError> {
+        let kept = self.newest.or(self.current).unwrap_or(1);
+        let half = 1 - kept.min(1);
+        let range = self.halves.get(half).cloned().ok_or(StoreError::Range)?;
+        self.current = None;
+        self.flash.erase(range.start, range.end).map_err(log::flash_error)?;
+        if self.push_starts(half)? == Push::Full {
+            return Err(StoreError::Damaged);
+        }
+        self.current = Some(half);
+        Ok(half)
+    }
+}
+
+impl PartialOrd for Kept {
+    fn partial_cmp(&self, other: &Self) -> Option<core::cmp::Ordering> {
+        Some(self.cmp(other))
+    }
+}
+
+impl Ord for Kept {
+    /// By age: the later one is the greater.
+    fn cmp(&self, other: &Self) -> core::cmp::Ordering {
+        self.serial.cmp(&other.serial).then(self.length.cmp(&other.length))
+    }
+}
