@@ -59,16 +59,16 @@ struct Step<const W: usize, const E: usize> {
 
 impl<const W: usize, const E: usize> Step<W, E> {
     /// Cuts the power in every operation of the step. The flash is taken out of a copy of the store and put back by a start.
-    fn cut_everywhere(&self, snapshots: &[Vec<u8>], range: &std::ops::Range<u32>, tears_each: usize) -> Figures {
+    fn cut_everywhere(&self, snapshots: &[Vec<u8>], range: &std::ops::Range<u32>) -> Figures {
         let mut figures = Figures { operations: self.operations.end - self.operations.start, ..Figures::default() };
         for operation in self.operations.clone() {
             let tears = tears(operation);
-            for turn in 0..tears_each {
+            for turn in 0..tears.len() {
                 let tear = tears[(turn + operation as usize) % tears.len()];
                 figures.cuts += 1;
                 let flash = self.until(Cut { operation, tear }, &snapshots[self.index]);
                 self.check(flash.clone(), snapshots, range, &mut figures);
-                if operation % 5 == 0 || tear != Tear::Done && turn == 0 && operation % 3 == 0 {
+                if turn == 0 && operation % 2 == 0 {
                     self.cut_while_starting(&flash, snapshots, range, &mut figures);
                 }
             }
@@ -139,11 +139,7 @@ impl<const W: usize, const E: usize> Step<W, E> {
     }
 }
 
-fn cut_a_drive<const W: usize, const E: usize>(
-    flash: FlashModel<W, E>,
-    snapshots: &[Vec<u8>],
-    tears_each: usize,
-) -> (Figures, Vec<u32>) {
+fn cut_a_drive<const W: usize, const E: usize>(flash: FlashModel<W, E>, snapshots: &[Vec<u8>]) -> (Figures, Vec<u32>) {
     let range = 0..(flash.erases().len() * E) as u32;
     let mut store = start(flash, range.clone()).unwrap();
     let mut steps = Vec::new();
@@ -159,17 +155,15 @@ fn cut_a_drive<const W: usize, const E: usize>(
         }
     }
     let erases = store.release().erases().to_vec();
-    let figures = steps
-        .par_iter()
-        .map(|step| step.cut_everywhere(snapshots, &range, tears_each))
-        .reduce(Figures::default, |a, b| a + b);
+    let figures =
+        steps.par_iter().map(|step| step.cut_everywhere(snapshots, &range)).reduce(Figures::default, |a, b| a + b);
     (figures, erases)
 }
 
 #[test]
 fn a_power_cut_in_any_operation_loses_at_most_the_newest_snapshot_in_pages_of_4_kib() {
     let snapshots = snapshots(0, 36, 14);
-    let (figures, erases) = cut_a_drive(Pages::new(8), &snapshots, 5);
+    let (figures, erases) = cut_a_drive(Pages::new(8), &snapshots);
     println!("8 pages of 4 KiB, words of 4 bytes: {figures:?}; erases {erases:?}");
     assert!(figures.none > 0 && figures.newest > 0 && figures.before > figures.newest);
     assert!(erases.iter().all(|&erases| erases >= 2), "every page is erased: {erases:?}");
@@ -178,7 +172,7 @@ fn a_power_cut_in_any_operation_loses_at_most_the_newest_snapshot_in_pages_of_4_
 #[test]
 fn a_power_cut_in_any_operation_loses_at_most_the_newest_snapshot_in_sectors_of_128_kib() {
     let snapshots = snapshots(440, 44, 10);
-    let (figures, erases) = cut_a_drive(Sectors::new(2).rewritable(), &snapshots, 2);
+    let (figures, erases) = cut_a_drive(Sectors::new(2).rewritable(), &snapshots);
     println!("2 sectors of 128 KiB, words of 1 byte: {figures:?}; erases {erases:?}");
     assert!(figures.none > 0 && figures.newest > 0 && figures.before > figures.newest);
     assert!(erases.iter().all(|&erases| erases >= 1), "every sector is erased: {erases:?}");
