@@ -31,6 +31,10 @@ pub const FILTER: RobustConfig = RobustConfig::DEFAULT;
 #[cfg(feature = "snapshot")]
 pub const SNAPSHOT_BYTES: usize = 8 * 1024;
 
+/// Where its flash keeps snapshots: the last two sectors of 128 KiB of 1 MiB, as offsets.
+#[cfg(feature = "store")]
+pub const STORE: core::ops::Range<u32> = 0xC_0000..0x10_0000;
+
 /// The detector of the reference robot.
 pub type Detector = PlaceDetector<SONARS>;
 /// The filter of the reference robot.

@@ -31,7 +31,7 @@ pub use reader::{Reader, Snapshot};
 pub use writer::Writer;
 
 use core::fmt;
-use crc::{CRC_32_ISO_HDLC, Crc, NoTable};
+use crc::{CRC_32_ISO_HDLC, Crc};
 
 /// The version of the layout; a snapshot of another one is refused.
 pub const SNAPSHOT_VERSION: u16 = 1;
@@ -51,8 +51,8 @@ const CRC_BYTES: usize = 4;
 /// What a snapshot with one section takes beside the contents of the section.
 pub(crate) const FRAME_BYTES: usize = HEADER_BYTES + SECTION_HEADER_BYTES + CRC_BYTES;
 
-/// CRC-32 ISO-HDLC, as on the wire, bit by bit: a snapshot is seldom, and a table takes 1 KiB of flash.
-static CRC: Crc<u32, NoTable> = Crc::<u32, NoTable>::new(&CRC_32_ISO_HDLC);
+/// CRC-32 ISO-HDLC, as on the wire. Its table takes 1 KiB of flash.
+static CRC: Crc<u32> = Crc::<u32>::new(&CRC_32_ISO_HDLC);
 
 /// Why a snapshot could not be written or read.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -15,6 +15,7 @@ impl<'a> Snapshot<'a> {
     /// # Errors
     /// [`SnapshotError::TooShort`], [`SnapshotError::Corrupt`], [`SnapshotError::Version`], or [`SnapshotError::Contents`]
     /// when the lengths of the sections are not those of the whole.
+    #[inline(never)]
     pub fn open(bytes: &'a [u8]) -> Result<Self, SnapshotError> {
         let mut header = Reader { bytes };
         if header.bytes(MAGIC.len())? != MAGIC {
@@ -75,6 +76,7 @@ impl<'a> Reader<'a> {
     ///
     /// # Errors
     /// [`SnapshotError::TooShort`] when there are not so many left.
+    #[inline(never)]
     pub fn bytes(&mut self, count: usize) -> Result<&'a [u8], SnapshotError> {
         let (read, rest) = self.bytes.split_at_checked(count).ok_or(SnapshotError::TooShort)?;
         self.bytes = rest;
@@ -91,6 +93,7 @@ impl<'a> Reader<'a> {
     ///
     /// # Errors
     /// As [`Reader::bytes`].
+    #[inline(never)]
     pub fn u8(&mut self) -> Result<u8, SnapshotError> {
         self.array().map(|[byte]| byte)
     }
@@ -99,6 +102,7 @@ impl<'a> Reader<'a> {
     ///
     /// # Errors
     /// As [`Reader::bytes`].
+    #[inline(never)]
     pub fn u16(&mut self) -> Result<u16, SnapshotError> {
         self.array().map(u16::from_le_bytes)
     }
@@ -107,6 +111,7 @@ impl<'a> Reader<'a> {
     ///
     /// # Errors
     /// As [`Reader::bytes`].
+    #[inline(never)]
     pub fn u32(&mut self) -> Result<u32, SnapshotError> {
         self.array().map(u32::from_le_bytes)
     }

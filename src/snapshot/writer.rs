@@ -74,6 +74,7 @@ impl<'a> Writer<'a> {
     ///
     /// # Errors
     /// [`SnapshotError::Full`] when there is no room; nothing is written then.
+    #[inline(never)]
     pub fn bytes(&mut self, bytes: &[u8]) -> Result<(), SnapshotError> {
         let end = self.len.saturating_add(bytes.len());
         // The CRC has its room.
@@ -92,6 +93,7 @@ impl<'a> Writer<'a> {
     ///
     /// # Errors
     /// As [`Writer::bytes`].
+    #[inline(never)]
     pub fn u8(&mut self, value: u8) -> Result<(), SnapshotError> {
         self.bytes(&[value])
     }
@@ -100,6 +102,7 @@ impl<'a> Writer<'a> {
     ///
     /// # Errors
     /// As [`Writer::bytes`].
+    #[inline(never)]
     pub fn u16(&mut self, value: u16) -> Result<(), SnapshotError> {
         self.bytes(&value.to_le_bytes())
     }
@@ -108,6 +111,7 @@ impl<'a> Writer<'a> {
     ///
     /// # Errors
     /// As [`Writer::bytes`].
+    #[inline(never)]
     pub fn u32(&mut self, value: u32) -> Result<(), SnapshotError> {
         self.bytes(&value.to_le_bytes())
     }

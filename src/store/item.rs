@@ -33,7 +33,17 @@ impl<'a> Item<'a> {
         }
     }
 
+    /// How many bytes the item has when it is packed.
+    pub(super) const fn length(&self) -> usize {
+        match self {
+            Self::Piece { bytes, .. } => PIECE_HEADER_BYTES + bytes.len(),
+            Self::End { .. } => 11,
+            Self::Starts { .. } => 9,
+        }
+    }
+
     /// Packs the item; tells how many bytes it has.
+    #[inline(never)]
     pub(super) fn pack(&self, to: &mut Packed) -> usize {
         let serial = self.serial().to_le_bytes();
         let mut length = 0;
@@ -64,6 +74,7 @@ impl<'a> Item<'a> {
     }
 
     /// The item that some bytes are; `None` for what is none.
+    #[inline(never)]
     pub(super) fn unpack(bytes: &'a [u8]) -> Option<Self> {
         let (&tag, rest) = bytes.split_first()?;
         let (serial, rest) = rest.split_first_chunk()?;
@@ -100,6 +111,7 @@ impl Assembly {
     pub(super) const NONE: Self = Self { serial: 0, pieces: 0, length: 0, is_whole: false };
 
     /// Takes the next item; gives number and length of a snapshot that it completes.
+    #[inline(never)]
     pub(super) fn take(&mut self, item: &Item<'_>) -> Option<(u32, usize)> {
         match *item {
             Item::Piece { serial, index, bytes } => {
@@ -146,6 +158,7 @@ mod tests {
         ] {
             let mut packed = Packed([0; ITEM_BYTES]);
             let length = item.pack(&mut packed);
+            assert_eq!(length, item.length());
             assert_eq!(Item::unpack(&packed.0[..length]), Some(item));
             assert_eq!(Item::unpack(&packed.0[..4]), None);
         }

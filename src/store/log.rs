@@ -11,7 +11,7 @@ use sequential_storage::cache::{Cache, Uncached};
 use sequential_storage::queue::{QueueConfig, QueueStorage};
 
 use super::StoreError;
-use super::item::{ITEM_BYTES, Item, PIECE_BYTES, Packed};
+use super::item::{ITEM_BYTES, Item, Packed};
 
 /// A blocking flash behind the asynchronous traits.
 struct Blocking<'a, FLASH>(&'a mut FLASH);
@@ -72,10 +72,14 @@ pub(super) struct Log<'a, FLASH: NorFlash> {
 impl<'a, FLASH: NorFlash> Log<'a, FLASH> {
     /// The unit that the queue counts in.
     const WORD: usize = if FLASH::WRITE_SIZE > FLASH::READ_SIZE { FLASH::WRITE_SIZE } else { FLASH::READ_SIZE };
-    /// What an item takes, its header of 8 bytes included.
-    const ITEM: usize = 8_usize.next_multiple_of(Self::WORD) + ITEM_BYTES.next_multiple_of(Self::WORD);
     /// How many of the largest items fit an erasable unit, beside its two marks.
-    pub(super) const ITEMS_IN_UNIT: usize = FLASH::ERASE_SIZE.saturating_sub(2 * Self::WORD) / Self::ITEM;
+    pub(super) const ITEMS_IN_UNIT: usize =
+        FLASH::ERASE_SIZE.saturating_sub(2 * Self::WORD) / Self::room_of(ITEM_BYTES);
+
+    /// What an item of so many bytes takes, its header of 8 bytes included.
+    pub(super) const fn room_of(length: usize) -> usize {
+        8_usize.next_multiple_of(Self::WORD) + length.next_multiple_of(Self::WORD)
+    }
 
     pub(super) fn new(flash: &'a mut FLASH, range: Range<u32>) -> Result<Self, StoreError> {
         let config = QueueConfig::try_new(range).map_err(|_| StoreError::Range)?;
@@ -83,6 +87,7 @@ impl<'a, FLASH: NorFlash> Log<'a, FLASH> {
     }
 
     /// Appends an item.
+    #[inline(never)]
     pub(super) fn push(&mut self, item: &Item<'_>) -> Result<Push, StoreError> {
         let mut packed = Packed([0; ITEM_BYTES]);
         let length = item.pack(&mut packed);
@@ -95,17 +100,9 @@ impl<'a, FLASH: NorFlash> Log<'a, FLASH> {
         }
     }
 
-    /// Whether there is room for a snapshot but for what the ends of pages waste.
-    pub(super) fn may_have_room(&mut self, length: usize) -> Result<bool, StoreError> {
-        match now(self.queue.space_left())? {
-            Ok(left) => Ok(left as usize >= length / PIECE_BYTES * Self::ITEM + length % PIECE_BYTES),
-            Err(sequential_storage::Error::Storage { value, .. }) => Err(flash_error(value)),
-            Err(_) => Ok(false),
-        }
-    }
-
     /// Shows every item, the oldest first, up to one that cannot be read.
-    pub(super) fn each(&mut self, mut visit: impl FnMut(Item<'_>)) -> Result<(), StoreError> {
+    #[inline(never)]
+    pub(super) fn each(&mut self, visit: &mut dyn FnMut(Item<'_>)) -> Result<(), StoreError> {
         let mut packed = Packed([0; ITEM_BYTES]);
         let mut items = match now(self.queue.iter())? {
             Ok(items) => items,

@@ -87,6 +87,8 @@ struct Survey {
     /// The newest complete snapshot below the number that was asked for.
     newest: Option<Kept>,
     starts: u32,
+    /// The bytes that its items take.
+    used: usize,
 }
 
 /// Snapshots in a range of flash. Memory: some words beside the flash's own, and some 500 bytes of stack.
@@ -96,6 +98,8 @@ pub struct Store<FLASH> {
     halves: [Range<u32>; 2],
     /// The half to which is written, if there is one that can be.
     current: Option<usize>,
+    /// The bytes that the items in that half take.
+    used: usize,
     /// The half with the newest complete snapshot.
     newest: Option<usize>,
     /// The last number that was given.
@@ -108,6 +112,7 @@ impl<FLASH: NorFlash> Store<FLASH> {
     ///
     /// # Errors
     /// [`StoreError::Range`], [`StoreError::Flash`], [`StoreError::NotReady`].
+    #[inline(never)]
     pub fn mount(flash: FLASH, range: Range<u32>) -> Result<Self, StoreError> {
         let unit = FLASH::ERASE_SIZE as u32;
         let length = range.end.saturating_sub(range.start);
@@ -123,14 +128,14 @@ impl<FLASH: NorFlash> Store<FLASH> {
         }
         let middle = range.start + length / 2;
         let halves = [range.start..middle, middle..range.end];
-        let mut store = Self { flash, halves, current: None, newest: None, serial: 0, starts: 0 };
+        let mut store = Self { flash, halves, current: None, used: 0, newest: None, serial: 0, starts: 0 };
         let (mut last, mut newest) = (0, None);
         for half in 0..2 {
             let survey = store.survey(half, u32::MAX)?;
             store.serial = store.serial.max(survey.serial);
             store.starts = store.starts.max(survey.starts);
             if survey.is_sound && survey.serial >= last {
-                (store.current, last) = (Some(half), survey.serial);
+                (store.current, store.used, last) = (Some(half), survey.used, survey.serial);
             }
             if survey.newest > newest {
                 (store.newest, newest) = (Some(half), survey.newest);
@@ -242,12 +247,14 @@ impl<FLASH: NorFlash> Store<FLASH> {
     }
 
     /// Looks through a half, for complete snapshots below a number.
+    #[inline(never)]
     fn survey(&mut self, half: usize, below: u32) -> Result<Survey, StoreError> {
         let mut survey = Survey::default();
         let mut assembly = Assembly::NONE;
         let mut is_first = true;
-        self.log(half)?.each(|item| {
+        self.log(half)?.each(&mut |item| {
             survey.serial = survey.serial.max(item.serial());
+            survey.used += Log::<FLASH>::room_of(item.length());
             if let Item::Starts { starts, .. } = item {
                 survey.is_sound |= is_first;
                 survey.starts = survey.starts.max(starts);
@@ -261,6 +268,8 @@ impl<FLASH: NorFlash> Store<FLASH> {
         })?;
         Ok(survey)
     }
+
+    #[inline(never)]
 
     fn newest_below(&mut self, below: u32, buffer: &mut [u8]) -> Result<Option<Kept>, StoreError> {
         let mut below = below;
@@ -283,10 +292,11 @@ impl<FLASH: NorFlash> Store<FLASH> {
     }
 
     /// Copies a snapshot; tells whether all of it was there.
+    #[inline(never)]
     fn read(&mut self, half: usize, kept: Kept, to: &mut [u8]) -> Result<bool, StoreError> {
         let mut is_complete = false;
         let mut assembly = Assembly::NONE;
-        self.log(half)?.each(|item| {
+        self.log(half)?.each(&mut |item| {
             if item.serial() != kept.serial {
                 return;
             }
@@ -300,11 +310,12 @@ impl<FLASH: NorFlash> Store<FLASH> {
     }
 
     /// Whether a snapshot reads as it should.
+    #[inline(never)]
     fn is_kept(&mut self, half: usize, serial: u32, snapshot: &[u8]) -> Result<bool, StoreError> {
         let mut is_same = true;
         let mut is_complete = false;
         let mut assembly = Assembly::NONE;
-        self.log(half)?.each(|item| {
+        self.log(half)?.each(&mut |item| {
             if item.serial() != serial {
                 return;
             }
@@ -317,38 +328,51 @@ impl<FLASH: NorFlash> Store<FLASH> {
     }
 
     /// Stores a snapshot behind what a half has; tells whether it had room for it and keeps it.
+    #[inline(never)]
     fn append(&mut self, half: usize, snapshot: &[u8]) -> Result<bool, StoreError> {
-        let serial = self.next_serial();
-        let mut log = self.log(half)?;
-        if !log.may_have_room(snapshot.len())? {
+        // The ends of pages waste some more: a snapshot may turn out not to fit.
+        let pieces =
+            snapshot.len() / PIECE_BYTES * Log::<FLASH>::room_of(item::ITEM_BYTES) + snapshot.len() % PIECE_BYTES;
+        let range = self.halves.get(half).cloned().unwrap_or(0..0);
+        if self.used.saturating_add(pieces) > range.end.saturating_sub(range.start) as usize {
             return Ok(false);
         }
+        let serial = self.next_serial();
         let mut pieces = 0;
         for (index, bytes) in (0..).zip(snapshot.chunks(PIECE_BYTES)) {
-            if log.push(&Item::Piece { serial, index, bytes })? == Push::Full {
+            if self.push(half, &Item::Piece { serial, index, bytes })? == Push::Full {
                 return Ok(false);
             }
             pieces = index + 1;
         }
         let end = Item::End { serial, pieces, length: snapshot.len() as u32 };
-        if log.push(&end)? == Push::Full || !self.is_kept(half, serial, snapshot)? {
+        if self.push(half, &end)? == Push::Full || !self.is_kept(half, serial, snapshot)? {
             return Ok(false);
         }
         self.newest = Some(half);
         Ok(true)
     }
 
+    #[inline(never)]
+
     fn push_starts(&mut self, half: usize) -> Result<Push, StoreError> {
         let (serial, starts) = (self.next_serial(), self.starts);
-        self.log(half)?.push(&Item::Starts { serial, starts })
+        self.push(half, &Item::Starts { serial, starts })
+    }
+
+    fn push(&mut self, half: usize, item: &Item<'_>) -> Result<Push, StoreError> {
+        self.used += Log::<FLASH>::room_of(item.length());
+        self.log(half)?.push(item)
     }
 
     /// Erases the half that does not have the newest snapshot, and writes there from now on.
+    #[inline(never)]
     fn change_halves(&mut self) -> Result<usize, StoreError> {
         let kept = self.newest.or(self.current).unwrap_or(1);
         let half = 1 - kept.min(1);
         let range = self.halves.get(half).cloned().ok_or(StoreError::Range)?;
         self.current = None;
+        self.used = 0;
         self.flash.erase(range.start, range.end).map_err(log::flash_error)?;
         if self.push_starts(half)? == Push::Full {
             return Err(StoreError::Damaged);

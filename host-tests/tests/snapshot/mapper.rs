@@ -2,7 +2,7 @@
 
 use toposlam::reference::{self, PaperReference, SONARS, VERTICES};
 use toposlam::snapshot::{Reader, Resume, Snapshot, SnapshotError, Writer};
-use toposlam::wire::map_digest;
+use toposlam::wire::{ResetCause, map_digest};
 use toposlam::{
     ConfigError, FaultCounters, Filter, FilterCapacities, Map, Mapper, MapperConfig, Observation, Update,
     WeightFactors, WorstNgram,
@@ -45,6 +45,10 @@ impl Filter<VERTICES> for Notes {
         &self.faults
     }
 
+    fn recent(&self, _: usize) -> Option<u8> {
+        None
+    }
+
     fn place_probability_q16(&self, _: u8) -> u32 {
         0
     }
@@ -75,7 +79,14 @@ impl Filter<VERTICES> for Notes {
 
 fn started<F: Filter<VERTICES>>(filter: F::Config) -> Box<Mapper<SONARS, VERTICES, F>> {
     let mut mapper = Box::new(Mapper::new());
-    let config = MapperConfig { geometry: reference::RING, place: reference::PLACE, filter, seed: 1, boot: 0 };
+    let config = MapperConfig {
+        geometry: reference::RING,
+        place: reference::PLACE,
+        filter,
+        seed: 1,
+        boot: 0,
+        reset_cause: ResetCause::Unknown,
+    };
     mapper.start(&config).unwrap();
     mapper
 }
@@ -109,7 +120,14 @@ fn the_next_place_begins_a_sequence_when_the_robot_may_be_elsewhere() {
     let mut mapper = started::<Notes>(9);
     assert_eq!(mapper.restore(&buffer[..length - 1], Resume::Elsewhere), Err(SnapshotError::TooShort));
     mapper.restore(&buffer[..length], Resume::Elsewhere).unwrap();
-    let config = MapperConfig { geometry: reference::RING, place: reference::PLACE, filter: 9, seed: 1, boot: 0 };
+    let config = MapperConfig {
+        geometry: reference::RING,
+        place: reference::PLACE,
+        filter: 9,
+        seed: 1,
+        boot: 0,
+        reset_cause: ResetCause::Unknown,
+    };
     mapper.start(&config).unwrap();
     drive(&mut mapper, &mut simulation(), 1);
     assert_eq!((mapper.filter().begins.as_slice(), mapper.filter().number), (&[false][..], 9));

@@ -1,1 +1,118 @@
-//! stub
+//! `docs/snapshot.md` is the specification: snapshots are read here by its tables alone.
+
+use super::*;
+use std::collections::HashMap;
+use toposlam::snapshot::SNAPSHOT_VERSION;
+
+const SPECIFICATION: &str = include_str!("../../../docs/snapshot.md");
+
+struct Field {
+    name: &'static str,
+    kind: &'static str,
+    count: &'static str,
+}
+
+/// The tables of fields, by their headings.
+fn tables() -> HashMap<&'static str, Vec<Field>> {
+    let sections = SPECIFICATION.split("\n### ").skip(1);
+    let fields = |section: &'static str| {
+        let rows = section.lines().filter(|line| line.starts_with("| "));
+        rows.map(|row| row.split('|').map(str::trim).collect::<Vec<_>>())
+            .filter(|cells| cells.len() == 6 && cells[1] != "Field")
+            .map(|cells| Field { name: cells[1], kind: cells[2], count: cells[3] })
+            .collect()
+    };
+    sections.map(|section| (section.lines().next().unwrap(), fields(section))).collect()
+}
+
+struct Interpreter<'a> {
+    tables: &'a HashMap<&'static str, Vec<Field>>,
+    bytes: &'a [u8],
+    values: HashMap<&'static str, u64>,
+}
+
+impl Interpreter<'_> {
+    fn count(&self, text: &str) -> u64 {
+        let (product, most) = text.strip_suffix(", 1 at most").map_or((text, u64::MAX), |product| (product, 1));
+        let factor = |name: &str| name.parse().unwrap_or_else(|_| self.values[name]);
+        product.split(" × ").map(factor).product::<u64>().min(most)
+    }
+
+    fn number(&mut self, bytes: usize) -> u64 {
+        let (read, rest) = self.bytes.split_at(bytes);
+        self.bytes = rest;
+        read.iter().rev().fold(0, |number, &byte| number << 8 | u64::from(byte))
+    }
+
+    fn read(&mut self, table: &str) {
+        for Field { name, kind, count } in &self.tables[table] {
+            let count = self.count(count);
+            let is_narrow = self.values.get("V").is_some_and(|&vertices| vertices <= 16);
+            if *kind == "path" {
+                let bytes = if is_narrow { count.div_ceil(2) } else { count };
+                self.bytes = &self.bytes[bytes as usize..];
+                continue;
+            }
+            for _ in 0..count {
+                let bytes = match *kind {
+                    "u8" => 1,
+                    "u16" => 2,
+                    "u32" | "f32" => 4,
+                    "u64" => 8,
+                    "row" if is_narrow => 2,
+                    "row" => 4,
+                    table => {
+                        self.read(table);
+                        continue;
+                    }
+                };
+                let number = self.number(bytes);
+                self.values.insert(name, number);
+            }
+        }
+    }
+}
+
+fn check<const N: usize, const V: usize, const T: usize>(drive: &Drive) {
+    let tables = tables();
+    let mut filter = drive.start::<N, V, T>();
+    for index in 0..drive.observations.len() {
+        if index % 3 == 0 {
+            let snapshot = saved(&mut filter, RobustFilter::<N, V, T>::SNAPSHOT_BYTES).unwrap();
+            let bytes = contents(&snapshot);
+            let mut interpreter = Interpreter { tables: &tables, bytes: &bytes, values: HashMap::new() };
+            interpreter.read("Filter");
+            assert!(interpreter.bytes.is_empty(), "{} {index}: {} left", drive.name, interpreter.bytes.len());
+            let value = |name| interpreter.values[name];
+            assert_eq!((value("kind"), value("V"), value("HISTORY")), (1, V as u64, T as u64));
+            assert_eq!((value("seed"), value("observed")), (7, u64::from(filter.observed())));
+            assert_eq!(value("places"), filter.path().count() as u64);
+            assert_eq!(value("vertices"), u64::from(filter.map().vertices()));
+            assert_eq!(value("map_probability"), u64::from(filter.map_probability_q16()));
+            let scale = f32::from_bits(value("scale") as u32);
+            assert!(
+                (f64::from(filter.noise_mm()) / 2.0).mul_add(f64::from(filter.noise_mm()), -f64::from(scale)).abs()
+                    < 0.1
+            );
+        }
+        drive.step(&mut filter, index);
+    }
+}
+
+#[test]
+fn snapshots_are_what_the_tables_say() {
+    for drive in drives(60) {
+        check::<4, 12, 24>(&drive);
+        check::<3, 20, 16>(&drive);
+    }
+}
+
+#[test]
+fn the_specification_states_the_version_and_the_largest_snapshot() {
+    for sentence in [
+        format!("The snapshot version is {SNAPSHOT_VERSION}."),
+        format!("{} bytes for the reference robot", toposlam::reference::Filter::SNAPSHOT_BYTES),
+    ] {
+        assert!(SPECIFICATION.contains(&sentence), "{sentence}");
+    }
+}

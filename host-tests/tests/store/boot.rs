@@ -12,7 +12,7 @@ type Robot16 = Box<reference::RobotMapper>;
 
 /// A robot that drove so far, and its store.
 fn after(places: u32, every: u32) -> (Robot16, Store<Sectors>) {
-    let mut store = Store::mount(Sectors::new(2), 0..262_144).unwrap();
+    let mut store = Store::mount(Sectors::new(8), reference::STORE).unwrap();
     let mut mapper = Robot16::new(reference::RobotMapper::new());
     let mut buffer = [0; reference::SNAPSHOT_BYTES];
     boot(&mut mapper, &reference::MAPPER, &mut store, &mut buffer, BootPolicy::Fresh).unwrap();
@@ -55,7 +55,7 @@ fn the_policy_says_whether_the_robot_goes_on_with_its_map() {
 
 #[test]
 fn the_robot_introduces_itself_with_the_number_of_its_start() {
-    let mut store = Store::mount(Sectors::new(2), 0..262_144).unwrap();
+    let mut store = Store::mount(Sectors::new(8), reference::STORE).unwrap();
     for number in 1..5 {
         let (mut mapper, _) = start(&mut store, BootPolicy::default());
         let mut said = None;
@@ -99,7 +99,7 @@ type RobustOther = toposlam::RobustFilter<10, 16, 100>;
 
 #[test]
 fn without_a_snapshot_or_without_a_flash_the_robot_starts_afresh() {
-    let mut store = Store::mount(Sectors::new(2), 0..262_144).unwrap();
+    let mut store = Store::mount(Sectors::new(8), reference::STORE).unwrap();
     let (mapper, report) = start(&mut store, BootPolicy::ContinueInPlace);
     assert_eq!((report.outcome, report.store, mapper.map().vertices()), (BootOutcome::Nothing, None, 0));
     let operation = store.flash_mut().operations();

@@ -11,8 +11,8 @@ struct Figures {
     /// How many operations of the flash the drive without cuts took.
     operations: u64,
     cuts: u64,
-    /// Cuts in the start that followed a cut.
-    cuts_while_starting: u64,
+    /// Cuts in the start that followed a cut, and in the storing that followed that.
+    second_cuts: u64,
     /// How often the snapshot that was being stored was there after the cut, and how often the one before.
     newest: u64,
     before: u64,
@@ -26,7 +26,7 @@ impl std::ops::Add for Figures {
         Self {
             operations: self.operations + other.operations,
             cuts: self.cuts + other.cuts,
-            cuts_while_starting: self.cuts_while_starting + other.cuts_while_starting,
+            second_cuts: self.second_cuts + other.second_cuts,
             newest: self.newest + other.newest,
             before: self.before + other.before,
             none: self.none + other.none,
@@ -58,18 +58,23 @@ struct Step<const W: usize, const E: usize> {
 }
 
 impl<const W: usize, const E: usize> Step<W, E> {
-    /// Cuts the power in every operation of the step. The flash is taken out of a copy of the store and put back by a start.
-    fn cut_everywhere(&self, snapshots: &[Vec<u8>], range: &std::ops::Range<u32>, tears_each: usize) -> Figures {
+    /// Cuts the power in every operation of the step, and after one of so many cuts once more.
+    fn cut_everywhere(&self, drive: &Drive, thinned: u64) -> Figures {
         let mut figures = Figures { operations: self.operations.end - self.operations.start, ..Figures::default() };
+        let before = self.index.checked_sub(1).map(|before| &drive.snapshots[before]);
+        let stored = Some(&drive.snapshots[self.index]);
         for operation in self.operations.clone() {
-            let tears = tears(operation);
-            for turn in 0..tears_each {
-                let tear = tears[(turn + operation as usize) % tears.len()];
+            for (turn, tear) in tears(operation).into_iter().enumerate() {
                 figures.cuts += 1;
-                let flash = self.until(Cut { operation, tear }, &snapshots[self.index]);
-                self.check(flash.clone(), snapshots, range, &mut figures);
-                if operation % 5 == 0 || tear != Tear::Done && turn == 0 && operation % 3 == 0 {
-                    self.cut_while_starting(&flash, snapshots, range, &mut figures);
+                let flash = self.until(Cut { operation, tear }, &drive.snapshots[self.index]);
+                let found = self.check(flash.clone(), drive, [before, stored]);
+                match () {
+                    () if found == stored => figures.newest += 1,
+                    () if found.is_some() => figures.before += 1,
+                    () => figures.none += 1,
+                }
+                if turn as u64 == operation / thinned % 5 && operation % thinned == 0 {
+                    figures.second_cuts += self.cut_again(&flash, drive, found);
                 }
             }
         }
@@ -87,67 +92,72 @@ impl<const W: usize, const E: usize> Step<W, E> {
         flash
     }
 
-    /// After a cut the store has the snapshot that was being stored or the one before, and takes the next.
-    fn check(
+    /// After a cut the store has one of two snapshots, or none if that is the first, and takes the next; tells what it has.
+    fn check<'a>(
         &self,
         flash: FlashModel<W, E>,
-        snapshots: &[Vec<u8>],
-        range: &std::ops::Range<u32>,
-        figures: &mut Figures,
-    ) {
+        drive: &'a Drive,
+        either: [Option<&'a Vec<u8>>; 2],
+    ) -> Option<&'a Vec<u8>> {
         let starts = self.store.starts();
-        let mut store = start(flash, range.clone()).unwrap();
+        let mut store = start(flash, drive.range.clone()).unwrap();
         assert!(store.starts() > starts, "starts are counted on");
         let found = newest(&mut store);
-        let before = self.index.checked_sub(1).map(|before| &snapshots[before]);
-        if found.as_ref() == Some(&snapshots[self.index]) {
-            figures.newest += 1;
-        } else if found.is_some() && found.as_ref() == before {
-            figures.before += 1;
-        } else {
-            assert!(found.is_none() && before.is_none(), "snapshot {} and what was before are lost", self.index);
-            figures.none += 1;
-        }
-        let next = &snapshots[(self.index + 1) % snapshots.len()];
+        let found = either.into_iter().find(|one| found.as_ref() == *one);
+        assert!(found.is_some(), "snapshot {} and what was before are lost", self.index);
+        let next = drive.next(self.index);
         store.save(next).unwrap();
         assert_eq!(newest(&mut store).as_ref(), Some(next));
-        let mut store = start(store.release(), range.clone()).unwrap();
+        let mut store = start(store.release(), drive.range.clone()).unwrap();
         assert_eq!(newest(&mut store).as_ref(), Some(next));
+        found.flatten()
     }
 
-    /// Cuts the power again in every operation of the start.
-    fn cut_while_starting(
-        &self,
-        flash: &FlashModel<W, E>,
-        snapshots: &[Vec<u8>],
-        range: &std::ops::Range<u32>,
-        figures: &mut Figures,
-    ) {
+    /// Cuts the power again in every operation of the start, and of the storing that follows; tells how often.
+    fn cut_again(&self, flash: &FlashModel<W, E>, drive: &Drive, found: Option<&Vec<u8>>) -> u64 {
+        let next = drive.next(self.index);
+        let go_on = |flash: &mut FlashModel<W, E>| {
+            let mut store = Store::mount(flash, drive.range.clone())?;
+            store.count_start()?;
+            store.save(next)
+        };
         let first = flash.operations();
-        let last = start(flash.clone(), range.clone()).unwrap().release().operations();
-        for operation in first..last {
+        let mut whole = flash.clone();
+        go_on(&mut whole).unwrap();
+        for operation in first..whole.operations() {
             let tear = tears(operation)[operation as usize % 5];
             let mut cut = flash.clone();
             cut.cut_power(Some(Cut { operation, tear }));
-            let begun = Store::mount(&mut cut, range.clone()).and_then(|mut store| store.count_start());
-            assert!(matches!(begun, Err(StoreError::Flash(_))));
+            assert!(matches!(go_on(&mut cut), Err(StoreError::Flash(_))));
             cut.power_on();
-            figures.cuts_while_starting += 1;
-            let mut ignored = Figures::default();
-            self.check(cut, snapshots, range, &mut ignored);
+            self.check(cut, drive, [found, Some(next)]);
         }
+        whole.operations() - first
+    }
+}
+
+/// What is stored, and where.
+struct Drive {
+    snapshots: Vec<Vec<u8>>,
+    range: std::ops::Range<u32>,
+}
+
+impl Drive {
+    fn next(&self, index: usize) -> &Vec<u8> {
+        &self.snapshots[(index + 1) % self.snapshots.len()]
     }
 }
 
 fn cut_a_drive<const W: usize, const E: usize>(
     flash: FlashModel<W, E>,
-    snapshots: &[Vec<u8>],
-    tears_each: usize,
+    snapshots: Vec<Vec<u8>>,
+    thinned: u64,
 ) -> (Figures, Vec<u32>) {
     let range = 0..(flash.erases().len() * E) as u32;
-    let mut store = start(flash, range.clone()).unwrap();
+    let drive = Drive { snapshots, range };
+    let mut store = start(flash, drive.range.clone()).unwrap();
     let mut steps = Vec::new();
-    for (index, snapshot) in snapshots.iter().enumerate() {
+    for (index, snapshot) in drive.snapshots.iter().enumerate() {
         let before = store.clone();
         let first = store.flash_mut().operations();
         store.save(snapshot).unwrap();
@@ -155,21 +165,17 @@ fn cut_a_drive<const W: usize, const E: usize>(
         let operations = first..store.flash_mut().operations();
         steps.push(Step { store: before, operations, index });
         if index % 4 == 3 {
-            store = start(store.release(), range.clone()).unwrap();
+            store = start(store.release(), drive.range.clone()).unwrap();
         }
     }
     let erases = store.release().erases().to_vec();
-    let figures = steps
-        .par_iter()
-        .map(|step| step.cut_everywhere(snapshots, &range, tears_each))
-        .reduce(Figures::default, |a, b| a + b);
-    (figures, erases)
+    let cut = |step: &Step<W, E>| step.cut_everywhere(&drive, thinned);
+    (steps.par_iter().map(cut).reduce(Figures::default, |a, b| a + b), erases)
 }
 
 #[test]
 fn a_power_cut_in_any_operation_loses_at_most_the_newest_snapshot_in_pages_of_4_kib() {
-    let snapshots = snapshots(0, 36, 14);
-    let (figures, erases) = cut_a_drive(Pages::new(8), &snapshots, 5);
+    let (figures, erases) = cut_a_drive(Pages::new(8), snapshots(0, 36, 14), 5);
     println!("8 pages of 4 KiB, words of 4 bytes: {figures:?}; erases {erases:?}");
     assert!(figures.none > 0 && figures.newest > 0 && figures.before > figures.newest);
     assert!(erases.iter().all(|&erases| erases >= 2), "every page is erased: {erases:?}");
@@ -177,8 +183,7 @@ fn a_power_cut_in_any_operation_loses_at_most_the_newest_snapshot_in_pages_of_4_
 
 #[test]
 fn a_power_cut_in_any_operation_loses_at_most_the_newest_snapshot_in_sectors_of_128_kib() {
-    let snapshots = snapshots(440, 44, 10);
-    let (figures, erases) = cut_a_drive(Sectors::new(2).rewritable(), &snapshots, 2);
+    let (figures, erases) = cut_a_drive(Sectors::new(2).rewritable(), snapshots(440, 44, 10), 30);
     println!("2 sectors of 128 KiB, words of 1 byte: {figures:?}; erases {erases:?}");
     assert!(figures.none > 0 && figures.newest > 0 && figures.before > figures.newest);
     assert!(erases.iter().all(|&erases| erases >= 1), "every sector is erased: {erases:?}");

@@ -45,6 +45,7 @@ impl<const N: usize, const V: usize, const HISTORY: usize> RobustFilter<N, V, HI
     ///
     /// # Errors
     /// [`SnapshotError::Full`] when there is no room for the best hypothesis.
+    #[inline(never)]
     pub fn save(&mut self, writer: &mut Writer<'_>) -> Result<(), SnapshotError> {
         self.make_canonical();
         self.head().save::<V, HISTORY>(writer)?;
@@ -88,6 +89,7 @@ impl<const N: usize, const V: usize, const HISTORY: usize> RobustFilter<N, V, HI
     }
 
     /// Reads a snapshot, and takes it over if it is to be `kept`; else only the drafts are written to.
+    #[inline(never)]
     fn read(&mut self, mut from: Reader<'_>, kept: bool) -> Result<(), SnapshotError> {
         let head = Head::read::<N, V, HISTORY>(&mut from)?;
         let len = usize::from(from.u16()?);

@@ -39,12 +39,14 @@ pub(super) fn save_row<const V: usize>(writer: &mut Writer<'_>, row: u32) -> Res
 }
 
 /// Reads a row of a map with so many vertices.
+#[inline(never)]
 pub(super) fn read_row<const V: usize>(from: &mut Reader<'_>, vertices: u8) -> Result<u32, SnapshotError> {
     let row = if row_bytes(V) == 2 { from.u16()?.into() } else { from.u32()? };
     if u64::from(row) >> (vertices & 63) == 0 { Ok(row) } else { Err(SnapshotError::Contents) }
 }
 
 /// Checks that every edge leads both ways.
+#[inline(never)]
 pub(super) fn check_symmetry(rows: &[u32]) -> Result<(), SnapshotError> {
     let leads = |from: u8, to: u8| rows.get(usize::from(from)).is_some_and(|row| row >> (to & 31) & 1 == 1);
     let is_symmetric = (0_u8..).zip(rows).all(|(from, &row)| bits(row.into()).all(|to| leads(to, from)));
@@ -62,6 +64,7 @@ pub(super) fn save_path<const V: usize>(writer: &mut Writer<'_>, path: &[u8]) ->
 }
 
 /// Reads a path of so many places through so many vertices, place by place.
+#[inline(never)]
 pub(super) fn read_path<const V: usize>(
     from: &mut Reader<'_>,
     places: usize,
@@ -86,6 +89,7 @@ pub(super) fn read_path<const V: usize>(
 }
 
 /// A finite float within some bounds.
+#[inline(never)]
 pub(super) fn bounded(value: f32, least: f32, most: f32) -> Result<f32, SnapshotError> {
     if value >= least && value <= most { Ok(value) } else { Err(SnapshotError::Contents) }
 }
