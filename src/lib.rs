@@ -132,6 +132,8 @@
 #![forbid(unsafe_code)]
 
 mod bearing;
+#[cfg(feature = "snapshot")]
+mod checksum;
 mod consistency;
 #[cfg(feature = "defmt")]
 mod defmt;
@@ -149,6 +151,8 @@ mod observation;
 pub mod place;
 pub mod reference;
 pub mod ring;
+#[cfg(feature = "wire")]
+pub mod robot;
 #[cfg(feature = "snapshot")]
 pub mod snapshot;
 pub mod sonar;

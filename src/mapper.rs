@@ -4,7 +4,7 @@ use crate::place::{Place, PlaceConfig, PlaceConfigError, PlaceDetector};
 use crate::ring::{RingFrame, RingGeometry};
 use crate::snapshot::{FILTER_SECTION, Resume, Snapshot, SnapshotError, Writer};
 use crate::wire::{Capacities, Hello, Message, QueueFull, Reporter, ResetCause};
-use crate::{ConfigError, FaultCounters, Filter, Map, Observation, Turn, Update};
+use crate::{ConfigError, FaultCounters, Filter, Map, Observation, RobustConfig, Turn, Update};
 use core::fmt;
 
 /// How often the robot introduces itself, in ring frames.
@@ -28,6 +28,17 @@ pub struct MapperConfig<const SONARS: usize, C> {
     pub boot: u32,
     /// Why the robot started.
     pub reset_cause: ResetCause,
+}
+
+impl<const SONARS: usize> MapperConfig<SONARS, RobustConfig> {
+    pub(crate) const UNSET: Self = Self {
+        geometry: RingGeometry { bearings_mrad: [0; SONARS] },
+        place: PlaceConfig::UNSET,
+        filter: RobustConfig::UNSET,
+        seed: 0,
+        boot: 0,
+        reset_cause: ResetCause::Unknown,
+    };
 }
 
 /// The stages from the ring frame to the messages of the wire, in one piece of fixed memory: a ring of `SONARS`, and a
@@ -122,11 +133,31 @@ impl<const SONARS: usize, const V: usize, F: Filter<V>> Mapper<SONARS, V, F> {
             self.slices += 1;
             self.filter.polish();
         }
+        self.tick(sonar_faults, send);
+        seen
+    }
+
+    /// Sends what is due at a steady pace, as [`Mapper::observe`] does, without a ring frame: for a robot that is paused.
+    pub fn tick(&mut self, sonar_faults: &FaultCounters, send: impl FnMut(&Message) -> Result<(), QueueFull>) {
         let mut faults = *sonar_faults;
         faults.add(self.detector.faults());
         faults.add(self.filter.faults());
-        self.reporter.tick(self.filter.map(), &faults, &mut send);
-        seen
+        self.reporter.tick(self.filter.map(), &faults, send);
+    }
+
+    /// Goes on with other settings; the map and what the filter knows stay.
+    ///
+    /// # Errors
+    /// Names the first setting that is out of its range; nothing has changed then.
+    pub fn set_config(&mut self, place: PlaceConfig, filter: F::Config) -> Result<(), MapperError> {
+        self.filter.set_config(filter).map_err(MapperError::Filter)?;
+        self.detector.set_config(place).map_err(MapperError::Place)
+    }
+
+    /// After a restore: the listener forgets what it knows, and the map goes out as a whole.
+    pub fn retell(&mut self, send: impl FnMut(&Message) -> Result<(), QueueFull>) {
+        self.reporter.forget(send);
+        self.reporter.hurry();
     }
 
     /// The robot was carried, or its drive has lost its way: the next place need not be a neighbour of the last one.
@@ -176,12 +207,18 @@ impl<const SONARS: usize, const V: usize, F: Filter<V>> Mapper<SONARS, V, F> {
     }
 
     /// The filter with all its hypotheses.
-    pub fn filter(&self) -> &F {
+    pub const fn filter(&self) -> &F {
         &self.filter
     }
 
+    /// The filter, to be told to localise only, or to go on mapping. What a listener was told about the map holds until the next
+    /// place.
+    pub fn filter_mut(&mut self) -> &mut F {
+        &mut self.filter
+    }
+
     /// The place detector.
-    pub fn detector(&self) -> &PlaceDetector<SONARS> {
+    pub const fn detector(&self) -> &PlaceDetector<SONARS> {
         &self.detector
     }
 }

@@ -7,7 +7,13 @@ use crate::{
     ring::RingGeometry,
 };
 #[cfg(feature = "wire")]
-use crate::{Mapper, MapperConfig, wire::ResetCause};
+use crate::{
+    Mapper, MapperConfig,
+    drive::DriveConfig,
+    robot::{self, Robot},
+    snapshot::SnapshotPolicy,
+    wire::ResetCause,
+};
 
 /// Sonars in the ring.
 pub const SONARS: usize = 16;
@@ -23,7 +29,10 @@ pub const SEED: u64 = 1;
 /// Sixteen sonars 22.5° apart, counter-clockwise, the first straight ahead.
 pub const RING: RingGeometry<SONARS> = RingGeometry::even();
 /// The detector's settings.
-pub const PLACE: PlaceConfig = PlaceConfig::DEFAULT;
+///
+/// A robot that drives itself stands at a meet point until the place is reported; it need not stand so long as one that
+/// somebody else has parked.
+pub const PLACE: PlaceConfig = PlaceConfig { settle_frames: 15, ..PlaceConfig::DEFAULT };
 /// The filter's settings.
 pub const FILTER: RobustConfig = RobustConfig::DEFAULT;
 
@@ -53,6 +62,18 @@ pub const MAPPER: MapperConfig<SONARS, RobustConfig> = MapperConfig {
     reset_cause: ResetCause::Unknown,
 };
 
+/// The whole robot: all stages, the drive and its commands.
+#[cfg(feature = "wire")]
+pub type ReferenceRobot<'buffer> = Robot<'buffer, SONARS, HYPOTHESES, VERTICES, HISTORY>;
+/// The settings of the whole robot.
+#[cfg(feature = "wire")]
+pub const ROBOT: robot::RobotConfig<SONARS> = robot::RobotConfig {
+    mapper: MAPPER,
+    drive: DriveConfig::DEFAULT,
+    snapshot: SnapshotPolicy::DEFAULT,
+    turn_bound_ms: 1000,
+};
+
 /// The most particles of the paper's filter, where it stands in for the reference robot's.
 pub const PAPER_PARTICLES: usize = 10;
 /// Words of its history: 32 observations each, so 256.
@@ -65,4 +86,5 @@ pub const PAPER_FILTER: Config = Config { direction: Direction::HistoryToMap, ..
 pub type PaperReference = PaperFilter<PAPER_PARTICLES, VERTICES, PAPER_HISTORY_WORDS>;
 
 #[cfg(feature = "snapshot")]
-const _: () = assert!(Filter::SNAPSHOT_BYTES <= SNAPSHOT_BYTES, "the buffer has room for every hypothesis");
+const _: () =
+    assert!(Filter::SNAPSHOT_BYTES + HISTORY + 16 <= SNAPSHOT_BYTES, "the buffer has room for every hypothesis");

@@ -28,6 +28,10 @@ impl Filter<VERTICES> for Notes {
         if history == 0 { Err(ConfigError("history")) } else { Ok(()) }
     }
 
+    fn set_config(&mut self, _: u16) -> Result<(), ConfigError> {
+        Ok(())
+    }
+
     fn observe(&mut self, observation: Observation) -> Update {
         self.observations.push(observation);
         Update {

@@ -26,7 +26,7 @@ impl DriveConfig {
     pub const DEFAULT: Self =
         Self { speed_permille: 1000, look_ahead_mm: 400, arrive_mm: 40, clearance_mm: 250, patience_frames: 100 };
 
-    pub(super) const UNSET: Self =
+    pub(crate) const UNSET: Self =
         Self { speed_permille: 0, look_ahead_mm: 0, arrive_mm: 0, clearance_mm: 0, patience_frames: 0 };
 
     /// Whether every field is in its range.

@@ -2,6 +2,8 @@
 
 use super::pilot::WaysOut;
 use crate::Filter;
+#[cfg(feature = "snapshot")]
+use crate::snapshot::{Reader, SnapshotError, Writer};
 
 /// A place has at most so many ways; the seventh and eighth have no room in the note of a place.
 pub(super) const WAYS: usize = 7;
@@ -50,6 +52,45 @@ impl<const HISTORY: usize> Departures<HISTORY> {
     /// What the robot did at the newest place led nowhere.
     pub(super) fn forget(&mut self) {
         self.note(0);
+    }
+
+    /// The notes of the places that are remembered, the oldest first: their number and one byte each.
+    #[cfg(feature = "snapshot")]
+    pub(super) fn save(&self, writer: &mut Writer<'_>) -> Result<(), SnapshotError> {
+        let remembered = (self.places as usize).min(HISTORY);
+        writer.u16(remembered as u16)?;
+        for ago in (0..remembered).rev() {
+            writer.u8(self.notes.get(self.slot(ago)).copied().unwrap_or(0))?;
+        }
+        Ok(())
+    }
+
+    /// Whether notes make sense.
+    #[cfg(feature = "snapshot")]
+    pub(super) fn check(mut section: Reader<'_>) -> Result<(), SnapshotError> {
+        let remembered = section.u16()?;
+        if usize::from(remembered) > HISTORY {
+            return Err(SnapshotError::Capacities);
+        }
+        for _ in 0..remembered {
+            let note = section.u8()?;
+            if note != 0 && note >> EXIT_SHIFT >= note & COUNT_MASK {
+                return Err(SnapshotError::Contents);
+            }
+        }
+        section.finish()
+    }
+
+    #[cfg(feature = "snapshot")]
+    pub(super) fn restore(&mut self, mut section: Reader<'_>) -> Result<(), SnapshotError> {
+        Self::check(section.clone())?;
+        self.clear();
+        for _ in 0..section.u16()? {
+            let note = section.u8()?;
+            self.arrive();
+            self.note(note);
+        }
+        Ok(())
     }
 
     fn note(&mut self, note: u8) {

@@ -25,6 +25,8 @@ pub use pilot::PilotState;
 pub use wheels::{DifferentialDrive, MotorError, Wheel, WheelSpeeds, WheelsConfig, WheelsConfigError};
 
 use crate::place::{Place, PlaceDetector};
+#[cfg(feature = "snapshot")]
+use crate::snapshot::{Reader, Resume, SnapshotError, Writer};
 use crate::{FaultCounters, Filter, Turn, Update};
 use navigator::Navigator;
 use pilot::Pilot;
@@ -97,6 +99,19 @@ impl<const V: usize, const HISTORY: usize> Drive<V, HISTORY> {
         self.pilot.reconsider();
     }
 
+    /// Drives at another speed from now on.
+    ///
+    /// # Errors
+    /// [`DriveConfigError::SpeedPermille`]; the drive goes on as it did.
+    pub fn set_speed(&mut self, speed_permille: u16) -> Result<(), DriveConfigError> {
+        self.pilot.set_speed(speed_permille)
+    }
+
+    /// Whether the best map has a way from where the robot is to a vertex.
+    pub fn leads_to(&self, filter: &impl Filter<V>, vertex: u8) -> bool {
+        navigator::leads_to(filter, vertex)
+    }
+
     /// What the drive is asked to do.
     pub const fn goal(&self) -> Goal {
         self.navigator.goal()
@@ -121,6 +136,38 @@ impl<const V: usize, const HISTORY: usize> Drive<V, HISTORY> {
     pub fn carried(&mut self) {
         self.navigator.forget_departure();
         self.pilot.lose_way();
+    }
+
+    /// Writes the drive's section of a snapshot: what it did at the places that the filter remembers.
+    ///
+    /// # Errors
+    /// [`SnapshotError::Full`].
+    #[cfg(feature = "snapshot")]
+    pub fn save(&self, writer: &mut Writer<'_>) -> Result<(), SnapshotError> {
+        self.navigator.save(writer)
+    }
+
+    /// Whether a section of a snapshot can be restored.
+    ///
+    /// # Errors
+    /// [`SnapshotError`] says what is wrong with it.
+    #[cfg(feature = "snapshot")]
+    pub fn check(section: Reader<'_>) -> Result<(), SnapshotError> {
+        Navigator::<V, HISTORY>::check(section)
+    }
+
+    /// Goes on with a section of a snapshot, or with nothing known, exploring.
+    ///
+    /// # Errors
+    /// As [`Drive::check`].
+    #[cfg(feature = "snapshot")]
+    pub fn restore(&mut self, section: Option<Reader<'_>>, resume: Resume) -> Result<(), SnapshotError> {
+        self.navigator.restore(section)?;
+        match resume {
+            Resume::InPlace => self.pilot.lose_way(),
+            Resume::Elsewhere => self.carried(),
+        }
+        Ok(())
     }
 
     /// How often the drive lost its way.

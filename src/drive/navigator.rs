@@ -5,6 +5,8 @@ use rand_core::Rng;
 use super::departures::{Departures, WAYS, Way};
 use super::pilot::WaysOut;
 use crate::filter::draws;
+#[cfg(feature = "snapshot")]
+use crate::snapshot::{Reader, SnapshotError, Writer};
 use crate::{Filter, Update};
 
 /// A robot is at a vertex when the filter believes so with at least this probability, in units of 2⁻¹⁶.
@@ -90,6 +92,24 @@ impl<const V: usize, const HISTORY: usize> Navigator<V, HISTORY> {
         self.departures.forget();
     }
 
+    #[cfg(feature = "snapshot")]
+    pub(super) fn save(&self, writer: &mut Writer<'_>) -> Result<(), SnapshotError> {
+        self.departures.save(writer)
+    }
+
+    #[cfg(feature = "snapshot")]
+    pub(super) fn check(section: Reader<'_>) -> Result<(), SnapshotError> {
+        Departures::<HISTORY>::check(section)
+    }
+
+    /// Goes on with what was saved, exploring.
+    #[cfg(feature = "snapshot")]
+    pub(super) fn restore(&mut self, section: Option<Reader<'_>>) -> Result<(), SnapshotError> {
+        self.set_goal(Goal::Explore);
+        self.departures.clear();
+        section.map_or(Ok(()), |section| self.departures.restore(section))
+    }
+
     /// The filter has taken in a place.
     pub(super) fn arrive(&mut self, filter: &impl Filter<V>, _update: &Update) {
         self.departures.arrive();
@@ -165,6 +185,12 @@ impl<const V: usize, const HISTORY: usize> Navigator<V, HISTORY> {
         let draw = draws(self.seed, u64::from(self.decisions)).next_u32() as usize;
         suitable().nth(draw.checked_rem(suitable().count())?)
     }
+}
+
+/// Whether the best map has a way from where the robot is to a vertex.
+pub(super) fn leads_to<const V: usize>(filter: &impl Filter<V>, vertex: u8) -> bool {
+    let here = filter.recent(0).map(usize::from);
+    here.is_some_and(|here| steps_to(filter, vertex).get(here).copied().flatten().is_some())
 }
 
 /// How many edges each vertex of the best map is away from another. Time O(V²) on rows of bits.

@@ -1,7 +1,7 @@
 //! Driving from place to place: along an edge, up to the meet point, out by the way that was chosen.
 
 use super::steering::{Beside, along_edge, meet_point};
-use super::{DriveConfig, Suggestion};
+use super::{DriveConfig, DriveConfigError, Suggestion};
 use crate::bearing::{HALF_TURN_MRAD, turn_mrad};
 use crate::place::scan::{SILENT, Scan, Ways};
 use crate::{FaultCounters, FaultKind, Turn};
@@ -85,6 +85,13 @@ impl Pilot {
 
     pub(super) fn start(&mut self, config: DriveConfig) {
         *self = Self { config, ..Self::new() };
+    }
+
+    pub(super) fn set_speed(&mut self, speed_permille: u16) -> Result<(), DriveConfigError> {
+        let config = DriveConfig { speed_permille, ..self.config };
+        config.check()?;
+        self.config = config;
+        Ok(())
     }
 
     pub(super) const fn state(&self) -> PilotState {

@@ -36,6 +36,12 @@ pub trait Filter<const V: usize>: Sized {
     /// [`ConfigError`] names the first setting that is out of its range.
     fn start(&mut self, config: Self::Config, seed: u64) -> Result<(), ConfigError>;
 
+    /// Goes on with other settings; what was observed stays.
+    ///
+    /// # Errors
+    /// [`ConfigError`] names the first setting that is out of its range; the filter goes on as it was.
+    fn set_config(&mut self, config: Self::Config) -> Result<(), ConfigError>;
+
     /// Takes the next place.
     fn observe(&mut self, observation: Observation) -> Update;
 
@@ -106,6 +112,10 @@ impl<const N: usize, const V: usize, const HISTORY: usize> Filter<V> for RobustF
         self.start(config, seed)
     }
 
+    fn set_config(&mut self, config: RobustConfig) -> Result<(), ConfigError> {
+        self.set_config(config)
+    }
+
     fn observe(&mut self, observation: Observation) -> Update {
         self.observe(observation)
     }
@@ -172,6 +182,10 @@ impl<const N: usize, const V: usize, const WORDS: usize> Filter<V> for PaperFilt
 
     fn start(&mut self, config: Config, seed: u64) -> Result<(), ConfigError> {
         self.start(config, seed)
+    }
+
+    fn set_config(&mut self, config: Config) -> Result<(), ConfigError> {
+        self.set_config(config)
     }
 
     fn observe(&mut self, observation: Observation) -> Update {

@@ -50,7 +50,7 @@ impl PlaceConfig {
     };
 
     /// What a detector holds before it is started: all zero.
-    pub(super) const UNSET: Self = Self {
+    pub(crate) const UNSET: Self = Self {
         equidistance_mm: 0,
         leave_mm: 0,
         separation_mrad: 0,

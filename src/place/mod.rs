@@ -139,6 +139,16 @@ impl<const SONARS: usize> PlaceDetector<SONARS> {
         Ok(())
     }
 
+    /// Goes on with other settings.
+    ///
+    /// # Errors
+    /// The first setting that is out of its range; the detector is then as it was.
+    pub fn set_config(&mut self, config: PlaceConfig) -> Result<(), PlaceConfigError> {
+        config.check(SONARS)?;
+        self.config = config;
+        Ok(())
+    }
+
     /// Takes the next frame; gives a place when the robot has just been at one.
     ///
     /// A place is reported some frames after the robot was closest to it, and once for each visit. Before the start

@@ -30,14 +30,16 @@ mod writer;
 pub use reader::{Reader, Snapshot};
 pub use writer::Writer;
 
+use crate::checksum::CRC;
 use core::fmt;
-use crc::{CRC_32_ISO_HDLC, Crc};
 
 /// The version of the layout; a snapshot of another one is refused.
 pub const SNAPSHOT_VERSION: u16 = 1;
 
 /// The tag of the filter's section.
 pub const FILTER_SECTION: u8 = 1;
+/// The tag of the drive's section.
+pub const DRIVE_SECTION: u8 = 2;
 
 /// What every snapshot begins with.
 const MAGIC: [u8; 4] = *b"TSLM";
@@ -50,9 +52,6 @@ const CRC_BYTES: usize = 4;
 
 /// What a snapshot with one section takes beside the contents of the section.
 pub(crate) const FRAME_BYTES: usize = HEADER_BYTES + SECTION_HEADER_BYTES + CRC_BYTES;
-
-/// CRC-32 ISO-HDLC, as on the wire. Its table takes 1 KiB of flash.
-static CRC: Crc<u32> = Crc::<u32>::new(&CRC_32_ISO_HDLC);
 
 /// Why a snapshot could not be written or read.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -3,9 +3,9 @@
 use core::fmt;
 use core::marker::PhantomData;
 
-use super::digest::CRC;
 use super::frame::{CRC_BYTES, HEADER_BYTES, MAX_RAW_BYTES};
 use super::{Message, Payload};
+use crate::checksum::CRC;
 
 /// What came of the bytes that were fed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

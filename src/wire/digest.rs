@@ -1,12 +1,8 @@
 //! CRC-32 of a frame and of a whole map.
 
-use crc::{CRC_32_ISO_HDLC, Crc};
-
 use super::Row;
 use crate::Map;
-
-/// CRC-32 ISO-HDLC, the one of zlib and Ethernet. Its table takes 1 KiB of flash.
-pub(super) static CRC: Crc<u32> = Crc::<u32>::new(&CRC_32_ISO_HDLC);
+use crate::checksum::CRC;
 
 /// CRC-32 ISO-HDLC of some bytes.
 pub fn crc32(bytes: &[u8]) -> u32 {

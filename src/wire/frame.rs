@@ -2,8 +2,8 @@
 
 use core::fmt;
 
-use super::digest::CRC;
 use super::{Echoes, Payload};
+use crate::checksum::CRC;
 
 /// The version of the frame layout and of everything that could break an old listener; the first byte of every frame. In a
 /// frame to the robot its top bit is set, so that a line that echoes what the robot says gives no commands.

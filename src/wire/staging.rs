@@ -46,6 +46,12 @@ impl<'buffer> Staging<'buffer> {
         Ok(())
     }
 
+    /// The whole snapshot that was taken; nothing when none was.
+    pub fn taken(&self) -> &[u8] {
+        let length = if let Holds::Outgoing { length } = self.holds { length } else { 0 };
+        self.buffer.get(..usize::from(length)).unwrap_or(&[])
+    }
+
     /// The piece of the snapshot that was taken from a byte on; an [`Outcome::Snapshot`], empty at the end.
     ///
     /// # Errors

@@ -31,6 +31,10 @@ impl Filter<VERTICES> for Notes {
         Ok(())
     }
 
+    fn set_config(&mut self, _: u8) -> Result<(), ConfigError> {
+        Ok(())
+    }
+
     fn observe(&mut self, observation: Observation) -> Update {
         self.begins.push(observation.begins);
         let factors = WeightFactors { ln_label_q16: 0, ln_consistency_q16: 0, ln_size_q16: 0 };

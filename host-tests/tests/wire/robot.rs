@@ -59,6 +59,10 @@ impl<const V: usize> Filter<V> for Believer<V> {
         Ok(())
     }
 
+    fn set_config(&mut self, _: ()) -> Result<(), ConfigError> {
+        Ok(())
+    }
+
     fn observe(&mut self, _: Observation) -> Update {
         unreachable!("the tests change the map themselves")
     }

@@ -77,6 +77,16 @@ impl<const N: usize, const V: usize, const WORDS: usize> PaperFilter<N, V, WORDS
         Ok(())
     }
 
+    /// Goes on with other settings.
+    ///
+    /// # Errors
+    /// As [`PaperFilter::start`].
+    pub fn set_config(&mut self, config: Config) -> Result<(), ConfigError> {
+        config.check(N)?;
+        self.config = config;
+        Ok(())
+    }
+
     /// Takes the next place on line: Γ_env is what the filter's own history holds, this observation included.
     ///
     /// Cost: (particles) · (V + 1) predictions, of which some particles' worth need the distance of Eq. 2; at most all.

@@ -33,7 +33,7 @@ impl RobustConfig {
     };
 
     /// What a filter holds before it is started: all zero.
-    pub(super) const UNSET: Self = Self {
+    pub(crate) const UNSET: Self = Self {
         hypotheses: 0,
         noise_mm: 0,
         resolution_mm: 0,

@@ -161,6 +161,25 @@ impl<const N: usize, const V: usize, const HISTORY: usize> RobustFilter<N, V, HI
         Ok(())
     }
 
+    /// Goes on with other settings: all hypotheses are weighed anew, and the noise is estimated anew from its first guess.
+    ///
+    /// # Errors
+    /// [`ConfigError`] names the first field that is out of its range; the filter goes on as it was.
+    pub fn set_config(&mut self, config: RobustConfig) -> Result<(), ConfigError> {
+        config.check(N)?;
+        self.config = config;
+        self.prices.configure(&config);
+        let (prices, record) = (&self.prices, &self.record);
+        self.beam.each(|hypothesis| hypothesis.recount(prices, record));
+        self.beam.sort();
+        Ok(())
+    }
+
+    /// Whether the map is kept as it is.
+    pub const fn is_localise_only(&self) -> bool {
+        self.localise_only
+    }
+
     /// Whether the map is kept as it is from now on: the filter then only tells where the robot is, notices by itself when
     /// it was carried elsewhere, and makes no moves. The places seen meanwhile count as evidence when mapping goes on.
     pub fn set_localise_only(&mut self, localise_only: bool) {

@@ -1,0 +1,147 @@
+//! What the robot does when it is told something.
+
+use super::{Board, Line, RECEIVED_PER_TURN, Robot, restore, snapshot};
+use crate::FaultKind;
+use crate::drive::{self, Goal};
+use crate::snapshot::Resume;
+use crate::wire::{Command, Inbox, Info, Journey, JourneyState, Message, Outcome, Refusal, Setting, Settings, Version};
+
+impl<const SONARS: usize, const N: usize, const V: usize, const HISTORY: usize> Robot<'_, SONARS, N, V, HISTORY> {
+    /// Takes what the line has received, and executes at most one command.
+    pub(super) fn obey(&mut self, board: &mut impl Board) {
+        for _ in 0..RECEIVED_PER_TURN {
+            let Some(byte) = board.receive() else { break };
+            self.inbox.take(byte);
+        }
+        // The command needs the robot, and the robot holds the inbox.
+        let mut inbox = core::mem::replace(&mut self.inbox, Inbox::new());
+        let reply = inbox.turn(|command| self.execute(command, board).unwrap_or_else(Outcome::Refused));
+        self.inbox = inbox;
+        if let Some(reply) = reply {
+            // A reply that finds no room is asked for again.
+            let _ = self.send(&Message::Reply(reply), board);
+        }
+    }
+
+    fn execute(&mut self, command: &Command, board: &mut impl Board) -> Result<Outcome, Refusal> {
+        match *command {
+            Command::Info => return Ok(Outcome::Info(self.info(board))),
+            Command::GetMap => self.mapper.hurry(),
+            Command::GetSnapshot { offset } => {
+                if offset == 0 {
+                    let Self { mapper, drive, staging, .. } = self;
+                    staging.take(|buffer| snapshot(mapper, drive, buffer).ok())?;
+                }
+                return self.staging.piece(offset);
+            }
+            Command::RestoreBegin { length, crc } => self.staging.begin(length, crc)?,
+            Command::RestoreChunk { offset, bytes } => self.staging.chunk(offset, bytes.as_slice())?,
+            Command::RestoreCommit => self.restore_staged(board)?,
+            Command::Reset => self.reset(board)?,
+            Command::SetConfig(setting) => self.set(setting)?,
+            Command::LocaliseOnly { on } => {
+                self.localise_only = on;
+                self.mapper.filter_mut().set_localise_only(on);
+            }
+            Command::GoTo { vertex } => self.go_to(vertex, board)?,
+            Command::Explore => self.set_goal(Goal::Explore, board),
+            Command::Pause { on } => self.paused = on,
+        }
+        Ok(Outcome::Done)
+    }
+
+    fn info(&self, board: &mut impl Board) -> Info {
+        let going_to = match (self.drive.goal(), self.drive.journey()) {
+            (Goal::Vertex(vertex), drive::Journey::Underway) => Some(vertex),
+            _ => None,
+        };
+        Info {
+            version: Version::LIBRARY,
+            boot: self.config.mapper.boot,
+            reset_cause: self.config.mapper.reset_cause,
+            uptime_ms: board.now_ms(),
+            paused: self.paused,
+            localise_only: self.localise_only,
+            going_to,
+            stored_bytes: self.stored_bytes,
+            stored_places_ago: if self.stored_bytes == 0 { 0 } else { self.places_since },
+        }
+    }
+
+    /// Goes on with the snapshot that came over the line, wherever the robot is.
+    fn restore_staged(&mut self, board: &mut impl Board) -> Result<(), Refusal> {
+        let Self { mapper, drive, staging, encoder, faults, .. } = self;
+        let bytes = staging.commit()?;
+        if restore(mapper, drive, bytes, Resume::Elsewhere).is_err() {
+            faults.count(FaultKind::SnapshotRejected);
+            return Err(Refusal::BadSnapshot);
+        }
+        let mut line = Line { encoder, faults, board };
+        self.mapper.retell(|message| line.send(message));
+        self.localise_only = self.mapper.filter().is_localise_only();
+        Ok(())
+    }
+
+    fn reset(&mut self, board: &mut impl Board) -> Result<(), Refusal> {
+        let Self { mapper, drive, config, encoder, faults, .. } = self;
+        let mut line = Line { encoder, faults, board };
+        mapper.reset(&config.mapper, |message| line.send(message)).map_err(|_| Refusal::OutOfRange)?;
+        drive.start(config.drive, config.mapper.seed).map_err(|_| Refusal::OutOfRange)?;
+        self.localise_only = false;
+        self.times_lost = 0;
+        self.journey = None;
+        Ok(())
+    }
+
+    fn set(&mut self, setting: Setting) -> Result<(), Refusal> {
+        let settings = Settings {
+            filter: self.config.mapper.filter,
+            place: self.config.mapper.place,
+            speed_permille: self.config.drive.speed_permille,
+            snapshot_every_places: self.config.snapshot.every_places,
+        };
+        let settings = settings.with(setting, N, SONARS)?;
+        self.mapper.set_config(settings.place, settings.filter).map_err(|_| Refusal::OutOfRange)?;
+        self.drive.set_speed(settings.speed_permille).map_err(|_| Refusal::OutOfRange)?;
+        self.config.mapper.filter = settings.filter;
+        self.config.mapper.place = settings.place;
+        self.config.drive.speed_permille = settings.speed_permille;
+        self.config.snapshot.every_places = settings.snapshot_every_places;
+        Ok(())
+    }
+
+    fn go_to(&mut self, vertex: u8, board: &mut impl Board) -> Result<(), Refusal> {
+        if vertex >= self.mapper.map().vertices() {
+            return Err(Refusal::UnknownVertex);
+        }
+        if !self.drive.leads_to(self.mapper.filter(), vertex) {
+            return Err(Refusal::NoRoute);
+        }
+        self.set_goal(Goal::Vertex(vertex), board);
+        Ok(())
+    }
+
+    fn set_goal(&mut self, goal: Goal, board: &mut impl Board) {
+        if let Some(journey) = self.journey.filter(|journey| journey.state == JourneyState::Underway) {
+            let _ = self.send(&Message::Journey(Journey { state: JourneyState::Replaced, ..journey }), board);
+        }
+        self.journey = None;
+        self.drive.set_goal(goal);
+    }
+
+    /// Tells how the way to a vertex goes, whenever that has changed.
+    pub(super) fn tell_journey(&mut self, board: &mut impl Board) {
+        let Goal::Vertex(vertex) = self.drive.goal() else { return };
+        let state = match self.drive.journey() {
+            drive::Journey::None => return,
+            drive::Journey::Underway => JourneyState::Underway,
+            drive::Journey::Arrived => JourneyState::Arrived,
+            drive::Journey::VertexGone => JourneyState::VertexGone,
+            drive::Journey::TooLong => JourneyState::Lost,
+        };
+        let journey = Journey { vertex, state };
+        if self.journey != Some(journey) && self.send(&Message::Journey(journey), board).is_ok() {
+            self.journey = Some(journey);
+        }
+    }
+}

@@ -1,0 +1,49 @@
+//! The robot's settings: those of its stages, and how its main loop runs.
+
+use core::fmt;
+
+use crate::drive::{DriveConfig, DriveConfigError};
+use crate::snapshot::SnapshotPolicy;
+use crate::{MapperConfig, MapperError, RobustConfig};
+
+/// The settings of every stage.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct RobotConfig<const SONARS: usize> {
+    /// From the ring frame to the map.
+    pub mapper: MapperConfig<SONARS, RobustConfig>,
+    /// From the map to the wheels.
+    pub drive: DriveConfig,
+    /// When snapshots are kept.
+    pub snapshot: SnapshotPolicy,
+    /// A turn of the main loop that takes longer is counted as a fault, in milliseconds.
+    pub turn_bound_ms: u16,
+}
+
+impl<const SONARS: usize> RobotConfig<SONARS> {
+    pub(super) const UNSET: Self = Self {
+        mapper: MapperConfig::UNSET,
+        drive: DriveConfig::UNSET,
+        snapshot: SnapshotPolicy { every_places: 0 },
+        turn_bound_ms: 0,
+    };
+}
+
+/// A setting of one of the stages is out of its range.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum RobotError {
+    /// One of the mapper's.
+    Mapper(MapperError),
+    /// One of the drive's.
+    Drive(DriveConfigError),
+}
+
+impl fmt::Display for RobotError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Mapper(error) => error.fmt(f),
+            Self::Drive(error) => error.fmt(f),
+        }
+    }
+}
+
+impl core::error::Error for RobotError {}

@@ -1,0 +1,337 @@
+//! The robot: everything between a ring frame and the wheels, the flash and the serial line, as one turn of the main loop.
+//!
+//! ```text
+//! ring frame ─▶ Mapper ─▶ Drive ─▶ wheels
+//!                 │  ▲
+//!   messages ◀────┘  └──── commands
+//! ```
+//!
+//! The firmware of every board and the simulations of a host run this same code. What differs from board to board is a
+//! [`Board`]: bytes in and out, wheels, a clock, a watchdog and somewhere to keep snapshots.
+//!
+//! ```
+//! use toposlam::reference::{ROBOT, ReferenceRobot, SNAPSHOT_BYTES, SONARS};
+//! use toposlam::ring::{Echo, RingFrame};
+//! use toposlam::robot::{Board, KeepError};
+//! use toposlam::{FaultCounters, drive::Suggestion, wire::QueueFull};
+//!
+//! /// A board with nothing on it.
+//! struct Bare;
+//!
+//! impl Board for Bare {
+//!     fn receive(&mut self) -> Option<u8> {
+//!         None
+//!     }
+//!     fn send(&mut self, _frame: &[u8]) -> Result<(), QueueFull> {
+//!         Ok(())
+//!     }
+//!     fn follow(&mut self, _suggestion: Suggestion) {}
+//!     fn feed_watchdog(&mut self) {}
+//!     fn now_ms(&mut self) -> u32 {
+//!         0
+//!     }
+//!     fn stack_high_water_bytes(&mut self) -> u32 {
+//!         0
+//!     }
+//!     fn keep(&mut self, _snapshot: &[u8]) -> Result<(), KeepError> {
+//!         Err(KeepError::NoStore)
+//!     }
+//! }
+//!
+//! let mut buffer = [0; SNAPSHOT_BYTES];
+//! let mut robot = Box::new(ReferenceRobot::new());
+//! robot.start(&ROBOT, &mut buffer)?;
+//! let frame = RingFrame { echoes: [Echo::Silence; SONARS] };
+//! robot.turn(&frame, &FaultCounters::new(), &mut Bare);
+//! assert_eq!(robot.mapper().map().vertices(), 0);
+//! # Ok::<(), toposlam::robot::RobotError>(())
+//! ```
+
+mod board;
+mod commands;
+mod config;
+
+pub use board::{Board, KeepError};
+pub use config::{RobotConfig, RobotError};
+
+use crate::drive::{Drive, Suggestion};
+use crate::place::Place;
+use crate::ring::RingFrame;
+use crate::snapshot::{DRIVE_SECTION, Resume, Snapshot, SnapshotError, SnapshotPolicy, Writer};
+use crate::wire::{self, Encoder, Health, Inbox, MAX_FRAME_BYTES, Message, QueueFull, Staging};
+use crate::{FaultCounters, FaultKind, Mapper, RobustFilter, Update};
+
+/// How often the robot says how it is doing, in turns of the loop.
+const TURNS_PER_HEALTH: u32 = 256;
+/// More bytes than the inbox looks at in a turn: what a receive buffer may hold.
+const RECEIVED_PER_TURN: usize = 1024;
+
+/// What a turn brought: the place that the robot has just been at, if at one.
+pub type Seen = Option<(Place, Update)>;
+
+/// A robot with a ring of `SONARS` and a filter of `N` hypotheses, maps of `V` vertices and a history of `HISTORY` places.
+///
+/// Const-constructed to zero, so that a `static` of it lies in `.bss`, and set up in place by [`Robot::start`]. Memory: the
+/// mapper's and the drive's, 700 bytes, and the caller's buffer for snapshots. Each turn costs at most what one place or one
+/// slice of polishing costs, and one command.
+#[derive(Debug)]
+pub struct Robot<'buffer, const SONARS: usize, const N: usize, const V: usize, const HISTORY: usize> {
+    config: RobotConfig<SONARS>,
+    mapper: Mapper<SONARS, V, RobustFilter<N, V, HISTORY>>,
+    drive: Drive<V, HISTORY>,
+    inbox: Inbox,
+    staging: Staging<'buffer>,
+    encoder: Encoder,
+    faults: FaultCounters,
+    paused: bool,
+    localise_only: bool,
+    /// How often the drive had lost its way when the mapper was last told.
+    times_lost: u32,
+    /// Places since the last snapshot that was kept, and its size; no bytes when there is none.
+    stored_bytes: u16,
+    places_since: u32,
+    turns: u32,
+    last_turn_ms: Option<u32>,
+    worst_turn_ms: u32,
+    journey: Option<wire::Journey>,
+}
+
+impl<'buffer, const SONARS: usize, const N: usize, const V: usize, const HISTORY: usize>
+    Robot<'buffer, SONARS, N, V, HISTORY>
+{
+    /// A robot that waits for [`Robot::start`].
+    pub const fn new() -> Self {
+        Self {
+            config: RobotConfig::UNSET,
+            mapper: Mapper::new(),
+            drive: Drive::new(),
+            inbox: Inbox::new(),
+            staging: Staging::new(&mut []),
+            encoder: Encoder::new(0),
+            faults: FaultCounters::new(),
+            paused: false,
+            localise_only: false,
+            times_lost: 0,
+            stored_bytes: 0,
+            places_since: 0,
+            turns: 0,
+            last_turn_ms: None,
+            worst_turn_ms: 0,
+            journey: None,
+        }
+    }
+
+    /// Starts afresh: no map, exploring. `buffer` is for snapshots on their way to flash or across the line; one of
+    /// [`RobustFilter::SNAPSHOT_BYTES`] and `HISTORY + 16` more has room for every hypothesis, and without one there are none.
+    ///
+    /// # Errors
+    /// [`RobotError`] names the first setting that is out of its range; the robot must then be started again.
+    pub fn start(&mut self, config: &RobotConfig<SONARS>, buffer: &'buffer mut [u8]) -> Result<(), RobotError> {
+        self.mapper.start(&config.mapper).map_err(RobotError::Mapper)?;
+        self.drive.start(config.drive, config.mapper.seed).map_err(RobotError::Drive)?;
+        self.config = *config;
+        self.inbox = Inbox::new();
+        self.staging = Staging::new(buffer);
+        self.faults = FaultCounters::new();
+        self.paused = false;
+        self.localise_only = false;
+        self.times_lost = 0;
+        self.stored_bytes = 0;
+        self.places_since = 0;
+        self.turns = 0;
+        self.last_turn_ms = None;
+        self.worst_turn_ms = 0;
+        self.journey = None;
+        Ok(())
+    }
+
+    /// One turn of the main loop: takes at most one command, maps the ring frame, drives on, keeps a snapshot when one is due,
+    /// and feeds the watchdog. `ring_faults` are those of the ring's driver so far.
+    pub fn turn(&mut self, frame: &RingFrame<SONARS>, ring_faults: &FaultCounters, board: &mut impl Board) -> Seen {
+        self.watch_the_clock(board);
+        self.obey(board);
+        let mut faults = *ring_faults;
+        faults.add(&self.faults);
+        faults.add(self.inbox.faults());
+        faults.add(self.drive.faults());
+        let (seen, suggestion) =
+            if self.paused { self.stand(&faults, board) } else { self.map_and_drive(frame, &faults, board) };
+        self.tell_drive(suggestion, board);
+        let is_due = |(_, update): &(Place, Update)| self.policy().is_due(update.place_index);
+        if seen.as_ref().is_some_and(is_due) {
+            // Erasing flash takes up to seconds; the robot must not drive blindly meanwhile.
+            board.follow(Suggestion::STAND);
+            self.keep_snapshot(board);
+            self.last_turn_ms = None;
+        }
+        board.follow(suggestion);
+        self.tell_journey(board);
+        if self.turns.is_multiple_of(TURNS_PER_HEALTH) {
+            let health = Health {
+                uptime_ms: board.now_ms(),
+                loop_count: self.turns,
+                stack_high_water_bytes: board.stack_high_water_bytes(),
+                worst_update_us: self.worst_turn_ms.saturating_mul(1000),
+            };
+            // A message that finds no room is counted; the next one comes.
+            let _ = self.send(&Message::Health(health), board);
+        }
+        self.turns = self.turns.wrapping_add(1);
+        board.feed_watchdog();
+        seen
+    }
+
+    fn map_and_drive(
+        &mut self,
+        frame: &RingFrame<SONARS>,
+        faults: &FaultCounters,
+        board: &mut impl Board,
+    ) -> (Seen, Suggestion) {
+        let mut line = Line { encoder: &mut self.encoder, faults: &mut self.faults, board };
+        let seen = self.mapper.observe(frame, self.drive.turn(), faults, |message| line.send(message));
+        let seen_now = seen.as_ref().map(|(place, update)| (place, update));
+        let suggestion = self.drive.advance(self.mapper.detector(), self.mapper.filter(), seen_now);
+        if self.drive.is_at_place() {
+            self.mapper.stay();
+        }
+        let times_lost = self.drive.faults().of(FaultKind::DriveLost);
+        if times_lost != self.times_lost {
+            self.times_lost = times_lost;
+            self.mapper.carried();
+        }
+        if seen.is_some() {
+            self.places_since = self.places_since.saturating_add(1);
+        }
+        (seen, suggestion)
+    }
+
+    /// A robot that is paused still says what it knows.
+    fn stand(&mut self, faults: &FaultCounters, board: &mut impl Board) -> (Seen, Suggestion) {
+        let mut line = Line { encoder: &mut self.encoder, faults: &mut self.faults, board };
+        self.mapper.tick(faults, |message| line.send(message));
+        (None, Suggestion::STAND)
+    }
+
+    /// Writes a snapshot of the drive and the mapper into the buffer, for the flash.
+    fn keep_snapshot(&mut self, board: &mut impl Board) {
+        let Self { mapper, drive, staging, .. } = self;
+        let kept = staging.take(|buffer| snapshot(mapper, drive, buffer).ok()).map(|()| board.keep(staging.taken()));
+        match kept {
+            Ok(Ok(())) => {
+                self.stored_bytes = u16::try_from(self.staging.taken().len()).unwrap_or(u16::MAX);
+                self.places_since = 0;
+            }
+            Ok(Err(KeepError::NoStore)) => {}
+            Ok(Err(KeepError::Failed)) | Err(_) => self.faults.count(FaultKind::StoreFailed),
+        }
+    }
+
+    /// Goes on with a snapshot, as of the last start or of another robot with the same capacities.
+    ///
+    /// # Errors
+    /// [`SnapshotError`] says what is wrong with the bytes; nothing has changed then, and the fault is counted.
+    pub fn restore(&mut self, bytes: &[u8], resume: Resume) -> Result<(), SnapshotError> {
+        let Self { mapper, drive, .. } = self;
+        let restored = restore(mapper, drive, bytes, resume);
+        match restored {
+            Ok(()) => self.localise_only = self.mapper.filter().is_localise_only(),
+            Err(_) => self.faults.count(FaultKind::SnapshotRejected),
+        }
+        restored
+    }
+
+    fn policy(&self) -> SnapshotPolicy {
+        self.config.snapshot
+    }
+
+    fn watch_the_clock(&mut self, board: &mut impl Board) {
+        let now_ms = board.now_ms();
+        if let Some(last_ms) = self.last_turn_ms {
+            let turn_ms = now_ms.wrapping_sub(last_ms);
+            self.worst_turn_ms = self.worst_turn_ms.max(turn_ms);
+            if turn_ms > u32::from(self.config.turn_bound_ms) {
+                self.faults.count(FaultKind::LoopLate);
+            }
+        }
+        self.last_turn_ms = Some(now_ms);
+    }
+
+    fn tell_drive(&mut self, suggestion: Suggestion, board: &mut impl Board) {
+        let drive = wire::Drive {
+            frame_index: self.turns,
+            heading_mrad: suggestion.heading_mrad,
+            speed_permille: suggestion.speed_permille.min(i16::MAX as u16) as i16,
+            state: self.drive.state() as u8,
+        };
+        let _ = self.send(&Message::Drive(drive), board);
+    }
+
+    fn send(&mut self, message: &Message, board: &mut impl Board) -> Result<(), QueueFull> {
+        Line { encoder: &mut self.encoder, faults: &mut self.faults, board }.send(message)
+    }
+
+    /// All stages up to the map.
+    pub const fn mapper(&self) -> &Mapper<SONARS, V, RobustFilter<N, V, HISTORY>> {
+        &self.mapper
+    }
+
+    /// The drive.
+    pub const fn drive(&self) -> &Drive<V, HISTORY> {
+        &self.drive
+    }
+}
+
+impl<const SONARS: usize, const N: usize, const V: usize, const HISTORY: usize> Default
+    for Robot<'_, SONARS, N, V, HISTORY>
+{
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+/// Messages on their way to the board's queue.
+struct Line<'a, BOARD> {
+    encoder: &'a mut Encoder,
+    faults: &'a mut FaultCounters,
+    board: &'a mut BOARD,
+}
+
+impl<BOARD: Board> Line<'_, BOARD> {
+    /// Queues a whole message, or drops it and counts that.
+    fn send(&mut self, message: &Message) -> Result<(), QueueFull> {
+        let mut bytes = [0; MAX_FRAME_BYTES];
+        let frame = self.encoder.encode(message, &mut bytes).map_err(|_| QueueFull)?;
+        let sent = self.board.send(frame);
+        if sent.is_err() {
+            self.faults.count(FaultKind::WireFull);
+        }
+        sent
+    }
+}
+
+/// Writes a whole snapshot: the drive's section, and the mapper's in the room that is left.
+fn snapshot<const SONARS: usize, const N: usize, const V: usize, const HISTORY: usize>(
+    mapper: &mut Mapper<SONARS, V, RobustFilter<N, V, HISTORY>>,
+    drive: &Drive<V, HISTORY>,
+    buffer: &mut [u8],
+) -> Result<usize, SnapshotError> {
+    let mut writer = Writer::new(buffer)?;
+    writer.section(DRIVE_SECTION, |section| drive.save(section))?;
+    mapper.save(&mut writer)?;
+    writer.finish()
+}
+
+/// Goes on with a snapshot. One without a section of the drive's is of a robot that was driven by hand.
+fn restore<const SONARS: usize, const N: usize, const V: usize, const HISTORY: usize>(
+    mapper: &mut Mapper<SONARS, V, RobustFilter<N, V, HISTORY>>,
+    drive: &mut Drive<V, HISTORY>,
+    bytes: &[u8],
+    resume: Resume,
+) -> Result<(), SnapshotError> {
+    let section = Snapshot::open(bytes)?.section(DRIVE_SECTION);
+    if let Some(section) = section.clone() {
+        Drive::<V, HISTORY>::check(section)?;
+    }
+    mapper.restore(bytes, resume)?;
+    drive.restore(section, resume)
+}
