@@ -14,9 +14,11 @@ struct Arguments {
 
 #[derive(Subcommand)]
 enum Task {
-    /// Drive a simulated robot through a floor plan and map it on this computer.
+    /// Let a simulated robot explore a floor plan, and map it on this computer.
     Simulate(command::simulate::Arguments),
-    /// Do the same with the firmware in an emulated STM32F405, and compare the maps bit for bit.
+    /// Let many simulated robots explore floor plans, and count right maps and journeys that arrive.
+    Explore(command::explore::Arguments),
+    /// Do the same as `simulate` with the firmware in an emulated STM32F405, and compare the maps bit for bit.
     Emulate(command::emulate::Arguments),
     /// Map a recording of ring ranges.
     Replay(command::replay::Arguments),
@@ -29,6 +31,7 @@ enum Task {
 fn main() -> anyhow::Result<()> {
     match Arguments::parse().task {
         Task::Simulate(arguments) => command::simulate::run(&arguments),
+        Task::Explore(arguments) => command::explore::run(&arguments),
         Task::Emulate(arguments) => command::emulate::run(&arguments),
         Task::Replay(arguments) => command::replay::run(&arguments),
         Task::Evaluate(arguments) => command::evaluate::run(&arguments),

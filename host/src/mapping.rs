@@ -145,28 +145,35 @@ impl<const SONARS: usize> Mapping<SONARS> {
         std::iter::repeat_n(None, forgotten).chain(known.into_iter().map(Some)).collect()
     }
 
-    /// How right the best map is. `nodes` is the true node of each place so far; phantoms have none and do not count.
-    /// The truth is what was traversed of the true map: the nodes, and the edges between successive ones.
+    /// How right the best map is; see [`score_path`].
     pub fn score(&self, truth: &TrueMap, nodes: &[Option<usize>]) -> MapScore {
-        let map = Graph::from_edges(
-            self.map().vertices().into(),
-            self.map().edges().map(|(a, b)| (usize::from(a), usize::from(b))),
-        );
-        let mut visited: Vec<usize> = nodes.iter().copied().flatten().collect();
-        visited.sort_unstable();
-        visited.dedup();
-        let class = |node: usize| visited.binary_search(&node).ok();
-        let path = self.path();
-        let real = path.iter().zip(nodes).filter_map(|(&vertex, &node)| Some((vertex?, class(node?)?)));
-        let (path, classes): (Vec<usize>, Vec<usize>) = real.unzip();
-        let is_edge = |&(from, to): &(usize, usize)| {
-            let ends = [visited[from], visited[to]];
-            truth.edges.iter().any(|edge| edge.nodes == ends || edge.nodes == [ends[1], ends[0]])
-        };
-        let traversed = classes.iter().zip(classes.iter().skip(1)).map(|(&from, &to)| (from, to)).filter(is_edge);
-        let truth = Graph::from_edges(visited.len(), traversed);
-        score_map(&map, &path, &truth, &classes)
+        score_path(self.map(), &self.path(), truth, nodes)
     }
+}
+
+/// How right a map is. `path` says for each place which vertex it was taken for, `nodes` its true node; phantoms have none and
+/// do not count. The truth is what was traversed of the true map: the nodes, and the edges between successive ones.
+pub fn score_path<const V: usize>(
+    map: &Map<V>,
+    path: &[Option<usize>],
+    truth: &TrueMap,
+    nodes: &[Option<usize>],
+) -> MapScore {
+    let edges = map.edges().map(|(a, b)| (usize::from(a), usize::from(b)));
+    let map = Graph::from_edges(map.vertices().into(), edges);
+    let mut visited: Vec<usize> = nodes.iter().copied().flatten().collect();
+    visited.sort_unstable();
+    visited.dedup();
+    let class = |node: usize| visited.binary_search(&node).ok();
+    let real = path.iter().zip(nodes).filter_map(|(&vertex, &node)| Some((vertex?, class(node?)?)));
+    let (path, classes): (Vec<usize>, Vec<usize>) = real.unzip();
+    let is_edge = |&(from, to): &(usize, usize)| {
+        let ends = [visited[from], visited[to]];
+        truth.edges.iter().any(|edge| edge.nodes == ends || edge.nodes == [ends[1], ends[0]])
+    };
+    let traversed = classes.iter().zip(classes.iter().skip(1)).map(|(&from, &to)| (from, to)).filter(is_edge);
+    let truth = Graph::from_edges(visited.len(), traversed);
+    score_map(&map, &path, &truth, &classes)
 }
 
 fn started<const SONARS: usize, F: Filter<VERTICES>>(

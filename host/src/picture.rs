@@ -4,8 +4,8 @@ use std::cmp::Reverse;
 
 use svg::Document;
 use svg::node::element::{Circle, Group, Line, Path, Polyline, Rectangle, Text, Title, path::Data};
+use toposlam::Map;
 
-use crate::mapping::Mapping;
 use crate::world::{Detection, Plan, Point, TrueMap};
 
 /// A vertex of the map to be drawn.
@@ -32,12 +32,12 @@ pub struct Drawing {
 
 impl Drawing {
     /// A map as a drawing, each vertex where the true node is that it was mostly taken for.
-    pub fn of_mapping<const SONARS: usize>(
-        mapping: &Mapping<SONARS>,
+    pub fn of_map<const V: usize>(
+        map: &Map<V>,
+        path: &[Option<usize>],
         detections: &[Detection],
         caption: String,
     ) -> Self {
-        let (map, path) = (mapping.map(), mapping.path());
         let vertices = (0..map.vertices()).zip(map.labels()).map(|(vertex, label)| {
             let visits = path.iter().zip(detections).filter(|&(&visited, _)| visited == Some(usize::from(vertex)));
             Vertex {

@@ -150,10 +150,7 @@ impl<'buffer, const SONARS: usize, const N: usize, const V: usize, const HISTORY
     pub fn turn(&mut self, frame: &RingFrame<SONARS>, ring_faults: &FaultCounters, board: &mut impl Board) -> Seen {
         self.watch_the_clock(board);
         self.obey(board);
-        let mut faults = *ring_faults;
-        faults.add(&self.faults);
-        faults.add(self.inbox.faults());
-        faults.add(self.drive.faults());
+        let faults = self.loop_faults(ring_faults);
         let (seen, suggestion) =
             if self.paused { self.stand(&faults, board) } else { self.map_and_drive(frame, &faults, board) };
         self.tell_drive(suggestion, board);
@@ -268,6 +265,23 @@ impl<'buffer, const SONARS: usize, const N: usize, const V: usize, const HISTORY
 
     fn send(&mut self, message: &Message, board: &mut impl Board) -> Result<(), QueueFull> {
         Line { encoder: &mut self.encoder, faults: &mut self.faults, board }.send(message)
+    }
+
+    /// Every fault so far, of all stages. `ring_faults` are those of the ring's driver.
+    pub fn faults(&self, ring_faults: &FaultCounters) -> FaultCounters {
+        let mut faults = self.loop_faults(ring_faults);
+        faults.add(self.mapper.detector().faults());
+        faults.add(self.mapper.filter().faults());
+        faults
+    }
+
+    /// Those that the mapper does not count itself.
+    fn loop_faults(&self, ring_faults: &FaultCounters) -> FaultCounters {
+        let mut faults = *ring_faults;
+        faults.add(&self.faults);
+        faults.add(self.inbox.faults());
+        faults.add(self.drive.faults());
+        faults
     }
 
     /// All stages up to the map.

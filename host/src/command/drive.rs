@@ -1,17 +1,18 @@
-//! What `simulate` and `emulate` have in common: a drive through a floor plan, mapped on this computer, and its summary.
+//! What `simulate` and `emulate` have in common: where the robot drives, and the summary of how that went.
 
 use std::path::PathBuf;
 
 use anyhow::Context;
-use clap::{Args, ValueEnum};
+use clap::Args;
 use indicatif::{ProgressBar, ProgressStyle};
-use toposlam::reference;
-use toposlam::ring::RingFrame;
+use toposlam::reference::VERTICES;
 use toposlam::wire::map_digest;
-use toposlam_host::mapping::{FilterChoice, Mapping, Step};
+use toposlam::{FaultCounters, Map};
+use toposlam_host::exploration::Exploration;
+use toposlam_host::mapping::score_path;
 use toposlam_host::picture::{Drawing, draw};
 use toposlam_host::recording::fault_lines;
-use toposlam_host::world::{Journal, Plan, RobotModel, SONARS, Simulation};
+use toposlam_host::world::{Journal, Plan, RobotModel, TrueMap};
 
 /// Where the robot drives, and how well its sonars hear.
 #[derive(Args)]
@@ -30,64 +31,32 @@ pub(super) struct DriveArguments {
     svg: Option<PathBuf>,
 }
 
-/// What the drive tells the filter besides the frames of the ring.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub(super) enum Hints {
-    /// Nothing.
-    None,
-    /// Whether the robot turned back at the place before.
-    Turn,
-}
-
-fn noise_factor(text: &str) -> Result<f64, String> {
+pub(super) fn noise_factor(text: &str) -> Result<f64, String> {
     let factor = text.parse().map_err(|error| format!("{error}"))?;
     if (0.0..=100.0).contains(&factor) { Ok(factor) } else { Err("must be 0 to 100".to_owned()) }
 }
 
-/// A drive with what is true of it and the map that this computer makes of it.
-pub(super) struct Drive {
-    plan: Plan,
-    simulation: Simulation,
-    journal: Journal,
-    mapping: Mapping<SONARS>,
-    hints: Hints,
-}
-
-impl Drive {
-    pub(super) fn start(arguments: &DriveArguments, filter: FilterChoice, hints: Hints) -> anyhow::Result<Self> {
-        let plan = load_plan(&arguments.plan)?;
-        let model = RobotModel::default().with_noise(arguments.noise);
-        let simulation = Simulation::new(&plan, model, arguments.seed)?;
-        let journal = Journal::new(simulation.true_map());
-        let mapping = Mapping::start(reference::RING, filter)?;
-        Ok(Self { plan, simulation, journal, mapping, hints })
+impl DriveArguments {
+    /// The floor plan, and the robot with its noise.
+    pub(super) fn world(&self) -> anyhow::Result<(Plan, RobotModel)> {
+        Ok((load_plan(&self.plan)?, RobotModel::default().with_noise(self.noise)))
     }
 
-    /// Drives on by one frame and maps it; gives a step when the robot has just been at a place.
-    pub(super) fn advance(&mut self) -> Option<(RingFrame<SONARS>, Option<Step>)> {
-        let (frame, truth) = self.simulation.next()?;
-        self.journal.drive(&truth);
-        let step = self.mapping.observe(&frame, truth.turn.filter(|_| self.hints == Hints::Turn));
-        if let Some(step) = &step {
-            self.journal.detect(&step.place);
-        }
-        Some((frame, step))
-    }
-
-    pub(super) fn mapping(&self) -> &Mapping<SONARS> {
-        &self.mapping
+    /// The seed of the drive.
+    pub(super) const fn seed(&self) -> u64 {
+        self.seed
     }
 
     /// Prints how the drive went and how right the map is, and draws the picture if one is wanted.
-    pub(super) fn summarise(&self, arguments: &DriveArguments) -> anyhow::Result<()> {
-        let Self { plan, simulation, journal, mapping, .. } = self;
+    pub(super) fn summarise<const V: usize>(&self, drive: &Summary<'_, V>) -> anyhow::Result<()> {
+        let Summary { plan, truth, journal, map, path, faults } = drive;
         let detections = journal.detections();
-        println!("\n{}: {} places in {} visits", arguments.plan, detections.len(), journal.visits());
+        println!("\n{}: {} places in {} visits", self.plan, detections.len(), journal.visits());
         println!("{}", journal.report());
         let nodes: Vec<Option<usize>> = detections.iter().map(|detection| detection.node).collect();
-        let score = mapping.score(simulation.true_map(), &nodes);
-        let (vertices, edges) = (mapping.map().vertices(), mapping.map().edges().count());
-        println!("map: {vertices} vertices, {edges} edges, digest {:08x}", map_digest(mapping.map()));
+        let score = score_path(map, path, truth, &nodes);
+        let (vertices, edges) = (map.vertices(), map.edges().count());
+        println!("map: {vertices} vertices, {edges} edges, digest {:08x}", map_digest(map));
         println!(
             "against the true map: exact {}, isomorphic {}, edge F1 {:.2}, located in {:.0} % of the places",
             yes_or_no(score.exact),
@@ -95,13 +64,37 @@ impl Drive {
             score.edge_f1,
             100.0 * score.location
         );
-        for line in fault_lines(&mapping.faults()) {
+        for line in fault_lines(faults) {
             println!("fault {line}");
         }
-        let Some(path) = &arguments.svg else { return Ok(()) };
-        let caption = format!("{}: the map after {} places", arguments.plan, detections.len());
-        let picture = draw(plan, simulation.true_map(), &Drawing::of_mapping(mapping, detections, caption));
-        std::fs::write(path, picture).with_context(|| format!("writing {}", path.display()))
+        let Some(file) = &self.svg else { return Ok(()) };
+        let caption = format!("{}: the map after {} places", self.plan, detections.len());
+        let picture = draw(plan, truth, &Drawing::of_map(map, path, detections, caption));
+        std::fs::write(file, picture).with_context(|| format!("writing {}", file.display()))
+    }
+}
+
+/// What a drive came to.
+pub(super) struct Summary<'a, const V: usize> {
+    pub(super) plan: &'a Plan,
+    pub(super) truth: &'a TrueMap,
+    pub(super) journal: &'a Journal,
+    pub(super) map: &'a Map<V>,
+    pub(super) path: Vec<Option<usize>>,
+    pub(super) faults: FaultCounters,
+}
+
+impl<'a> Summary<'a, VERTICES> {
+    /// That of a robot which drove by itself.
+    pub(super) fn of(plan: &'a Plan, exploration: &'a Exploration<'_>) -> Self {
+        Self {
+            plan,
+            truth: exploration.rover().true_map(),
+            journal: exploration.journal(),
+            map: exploration.robot().mapper().map(),
+            path: exploration.path(),
+            faults: exploration.faults(),
+        }
     }
 }
 
@@ -116,7 +109,7 @@ fn yes_or_no(answer: bool) -> &'static str {
 }
 
 /// A built-in plan by its name, or one from a file.
-fn load_plan(name_or_file: &str) -> anyhow::Result<Plan> {
+pub(super) fn load_plan(name_or_file: &str) -> anyhow::Result<Plan> {
     if let Some(plan) = Plan::built_in(name_or_file) {
         return Ok(plan);
     }

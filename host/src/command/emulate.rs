@@ -1,14 +1,22 @@
-//! `toposlam emulate`: the same drive as `simulate`, mapped by the firmware in an emulated STM32F405.
+//! `toposlam emulate`: the same exploration as `simulate`, mapped and driven by the firmware in an emulated STM32F405.
 
-use std::{ops::ControlFlow, path::PathBuf, process::Command, sync::Mutex, time::Duration};
+use std::{
+    ops::ControlFlow,
+    path::PathBuf,
+    process::Command,
+    sync::{Mutex, mpsc},
+    time::Duration,
+};
 
 use anyhow::{Context, bail, ensure};
 use clap::Args;
-use toposlam::wire::{Decoder, Evidence, Location, Message, Picture, Progress};
+use toposlam::drive::Suggestion;
+use toposlam::reference::SNAPSHOT_BYTES;
+use toposlam::wire::{Belief, Decoder, Evidence, Location, Message, Picture, Progress, Worst};
 use toposlam_host::emulator::Emulation;
-use toposlam_host::mapping::FilterChoice;
+use toposlam_host::exploration::Exploration;
 
-use super::drive::{Drive, DriveArguments, Hints, progress_bar};
+use super::drive::{DriveArguments, Summary, progress_bar};
 
 /// Where `cargo firmware` puts the image.
 const IMAGE: &str = "thumbv7em-none-eabihf/release/robot";
@@ -32,6 +40,15 @@ pub(crate) struct Arguments {
     timeout_s: u64,
 }
 
+/// So long the world waits for the firmware to say where it drives.
+const SUGGESTION_TIMEOUT: Duration = Duration::from_secs(10);
+
+/// The same robot on this computer, and where it wanted to go after each frame.
+struct Repetition<'buffer> {
+    exploration: Exploration<'buffer>,
+    suggestions: Vec<Suggestion>,
+}
+
 /// What the firmware said.
 struct Heard {
     decoder: Decoder,
@@ -40,8 +57,8 @@ struct Heard {
 }
 
 impl Heard {
-    /// Takes bytes of the line; calls `on_location` whenever the firmware says where the robot is.
-    fn feed(&mut self, bytes: &[u8], mut on_location: impl FnMut(Location) -> ControlFlow<()>) -> ControlFlow<()> {
+    /// Takes bytes of the line, and hands on every message.
+    fn feed(&mut self, bytes: &[u8], mut on_message: impl FnMut(Message) -> ControlFlow<()>) -> ControlFlow<()> {
         let mut rest = bytes;
         loop {
             rest = match self.decoder.feed(rest) {
@@ -49,11 +66,10 @@ impl Heard {
                 Progress::Error { rest, .. } => rest,
                 Progress::Message { header, message, rest } => {
                     self.picture.apply(header, &message);
-                    match message {
-                        Message::Place { place_index, radius_mm, .. } => self.places.push((place_index, radius_mm)),
-                        Message::Location(location) => on_location(location)?,
-                        _ => {}
+                    if let Message::Place { place_index, radius_mm, .. } = message {
+                        self.places.push((place_index, radius_mm));
                     }
+                    on_message(message)?;
                     rest
                 }
             };
@@ -66,51 +82,81 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
         Some(elf) => elf.clone(),
         None => build_firmware()?,
     };
+    let (plan, model) = arguments.drive.world()?;
+    let mut buffer = [0; SNAPSHOT_BYTES];
     // The emulator asks for frames on one thread and hands on what it heard on another.
-    // The firmware has no drive that could tell it of turns, so neither has this computer.
-    let drive = Mutex::new(Drive::start(&arguments.drive, FilterChoice::Robust, Hints::None)?);
+    let repetition = Mutex::new(Repetition {
+        exploration: Exploration::start(&plan, model, arguments.drive.seed(), &mut buffer)?,
+        suggestions: Vec::new(),
+    });
+    let (tell_suggestion, suggestions) = mpsc::channel::<Suggestion>();
     let progress = progress_bar(arguments.places)?;
     let mut heard = Heard { decoder: Decoder::new(), picture: Picture::new(), places: Vec::new() };
-    let mut printed = 0;
     let mut elsewhere = None;
+    let mut frames = 0;
+    let (repeated, bar) = (&repetition, &progress);
 
     let mut emulation = Emulation::new(elf);
     emulation.qemu = arguments.qemu.clone();
     emulation.timeout = Duration::from_secs(arguments.timeout_s);
     let outcome = emulation.run(
-        || {
-            let mut drive = drive.lock().ok()?;
-            if drive.mapping().steps().len() >= arguments.places {
+        move || {
+            if frames > 0 {
+                // The firmware has driven on by what it said after the last frame.
+                let suggestion = suggestions.recv_timeout(SUGGESTION_TIMEOUT).ok()?;
+                repeated.lock().ok()?.exploration.drive(suggestion);
+            }
+            let mut repetition = repeated.lock().ok()?;
+            if repetition.exploration.places() >= arguments.places {
                 return None;
             }
-            drive.advance().map(|(frame, _)| frame)
+            frames += 1;
+            let frame = repetition.exploration.frame();
+            if repetition.exploration.map(&frame).is_some()
+                && let Some(step) = repetition.exploration.steps().last()
+            {
+                bar.suspend(|| println!("{step}"));
+                bar.inc(1);
+            }
+            let suggestion = repetition.exploration.board().suggestion;
+            repetition.suggestions.push(suggestion);
+            Some(frame)
         },
         |bytes| {
-            heard.feed(bytes, |location| {
-                let Ok(drive) = drive.lock() else { return ControlFlow::Break(()) };
-                let steps = drive.mapping().steps();
-                let same = steps.get(location.place_index as usize).map(|step| Location::from(&step.update));
-                if same != Some(location) {
-                    elsewhere = Some(location);
-                    return ControlFlow::Break(());
+            heard.feed(bytes, |message| {
+                let Ok(repetition) = repetition.lock() else { return ControlFlow::Break(()) };
+                let is_same = match message {
+                    Message::Drive(drive) => {
+                        let speed_permille = drive.speed_permille.unsigned_abs();
+                        let suggestion = Suggestion { heading_mrad: drive.heading_mrad, speed_permille };
+                        // The world may have ended meanwhile.
+                        let _ = tell_suggestion.send(suggestion);
+                        let expected = repetition.suggestions.get(drive.frame_index as usize);
+                        expected.is_none_or(|expected| *expected == suggestion)
+                    }
+                    Message::Location(location) => {
+                        let step = repetition.exploration.steps().get(location.place_index as usize);
+                        step.is_none_or(|step| Location::from(&step.update) == location)
+                    }
+                    _ => true,
+                };
+                if is_same {
+                    return ControlFlow::Continue(());
                 }
-                // The location is repeated; a place is printed once.
-                for step in steps.iter().take(location.place_index as usize + 1).skip(printed) {
-                    progress.suspend(|| println!("{step}"));
-                    printed += 1;
-                }
-                progress.set_position(printed as u64);
-                ControlFlow::Continue(())
+                elsewhere = Some(message);
+                ControlFlow::Break(())
             })
         },
     )?;
     progress.finish_and_clear();
-    if let Some(Location { place_index, vertex }) = elsewhere {
-        bail!("at place {place_index} the firmware believes to be at vertex {vertex}, and this computer does not");
+    if let Some(message) = elsewhere {
+        bail!("the firmware says {message:?}, and this computer does not");
     }
 
-    let Ok(drive) = drive.into_inner() else { bail!("the repetition on this computer failed") };
-    drive.summarise(&arguments.drive)?;
+    let Ok(Repetition { exploration, .. }) = repetition.into_inner() else {
+        bail!("the repetition on this computer failed")
+    };
+    arguments.drive.summarise(&Summary::of(&plan, &exploration))?;
     let counters = heard.decoder.counters();
     let Some(health) = heard.picture.health() else { bail!("the firmware never said how it is doing") };
     println!("firmware: {} places in {} frames, {:.1} s", heard.places.len(), outcome.frames, outcome.seconds);
@@ -119,14 +165,15 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     if let Some(bytes) = outcome.stack_high_water_bytes {
         println!("stack_high_water_bytes: {bytes}");
     }
-    compare(&drive, &heard)?;
-    println!("the firmware's map is this computer's, bit for bit");
+    compare(&exploration, &heard)?;
+    println!("the firmware's drive and map are this computer's, bit for bit");
     Ok(())
 }
 
 /// Holds what the firmware said to this computer's repetition. The digest is part of a converged picture.
-fn compare(drive: &Drive, heard: &Heard) -> anyhow::Result<()> {
-    let (steps, map) = (drive.mapping().steps(), drive.mapping().map());
+fn compare(exploration: &Exploration<'_>, heard: &Heard) -> anyhow::Result<()> {
+    let (steps, mapper) = (exploration.steps(), exploration.robot().mapper());
+    let map = mapper.map();
     let places = steps.iter().map(|step| (step.update.place_index, step.place.fingerprint.radius_mm()));
     ensure!(places.eq(heard.places.iter().copied()), "the firmware detected other places than this computer");
     ensure!(heard.picture.is_converged(), "the map heard over the wire is not complete");
@@ -139,12 +186,16 @@ fn compare(drive: &Drive, heard: &Heard) -> anyhow::Result<()> {
     });
     ensure!(same_rows && heard.picture.vertices() == map.vertices(), "the firmware's map is another one");
     if let Some(step) = steps.last() {
-        let same_location = heard.picture.location() == Some(Location::from(&step.update));
-        ensure!(same_location, "the firmware believes to be elsewhere");
-        let same_evidence = heard.picture.evidence() == Some(Evidence::from(&step.update));
-        ensure!(same_evidence, "the firmware gives other evidence");
-        ensure!(heard.picture.belief() == drive.mapping().belief(), "the firmware gives other probabilities");
-        ensure!(heard.picture.worst() == drive.mapping().worst(), "the firmware names another worst n-gram");
+        let (filter, place_index) = (mapper.filter(), step.update.place_index);
+        ensure!(
+            heard.picture.location() == Some(Location::from(&step.update)),
+            "the firmware believes to be elsewhere"
+        );
+        ensure!(heard.picture.evidence() == Some(Evidence::from(&step.update)), "the firmware gives other evidence");
+        let belief = Some(Belief::of(filter, place_index));
+        ensure!(heard.picture.belief() == belief, "the firmware gives other probabilities");
+        let worst = Some(Worst::of(filter, place_index));
+        ensure!(heard.picture.worst() == worst, "the firmware names another worst n-gram");
     }
     Ok(())
 }

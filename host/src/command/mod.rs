@@ -5,6 +5,8 @@ pub(crate) mod console;
 mod drive;
 pub(crate) mod emulate;
 pub(crate) mod evaluate;
+pub(crate) mod explore;
 mod filter;
+mod rails;
 pub(crate) mod replay;
 pub(crate) mod simulate;

@@ -1,9 +1,11 @@
-//! `toposlam simulate`: drive a simulated robot through a floor plan.
+//! `toposlam simulate`: a simulated robot explores a floor plan by its own drive.
 
 use clap::Args;
+use toposlam::reference::SNAPSHOT_BYTES;
+use toposlam_host::exploration::Exploration;
 
-use super::drive::{Drive, DriveArguments, Hints, progress_bar};
-use super::filter::FilterArgument;
+use super::drive::{DriveArguments, Summary, progress_bar};
+use super::rails::{self, OnRails};
 
 /// Arguments of `toposlam simulate`.
 #[derive(Args)]
@@ -16,26 +18,29 @@ pub(crate) struct Arguments {
     /// Stop after this many frames at the latest (10 a second); 0: no limit.
     #[arg(long, default_value_t = 1_000_000)]
     frames: u64,
-    /// The filter that makes the map.
-    #[arg(long, value_enum, default_value_t = FilterArgument::Robust)]
-    filter: FilterArgument,
-    /// What the drive tells the filter besides the frames of the ring.
-    #[arg(long, value_enum, default_value_t = Hints::Turn)]
-    hints: Hints,
+    #[command(flatten)]
+    rails: OnRails,
 }
 
 pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
-    let mut drive = Drive::start(&arguments.drive, arguments.filter.into(), arguments.hints)?;
-    let progress = progress_bar(arguments.places)?;
-    let mut frames = 0;
-    while drive.mapping().steps().len() < arguments.places && (arguments.frames == 0 || frames < arguments.frames) {
-        let Some((_, step)) = drive.advance() else { break };
-        frames += 1;
-        if let Some(step) = step {
+    let Arguments { drive, places, frames, rails } = arguments;
+    if rails.on_rails {
+        return rails::run(drive, rails, *places, *frames);
+    }
+    let (plan, model) = drive.world()?;
+    let mut buffer = [0; SNAPSHOT_BYTES];
+    let mut exploration = Exploration::start(&plan, model, drive.seed(), &mut buffer)?;
+    let progress = progress_bar(*places)?;
+    while exploration.places() < *places && (*frames == 0 || exploration.frames() < *frames) {
+        if exploration.advance().is_some()
+            && let Some(step) = exploration.steps().last()
+        {
             progress.suspend(|| println!("{step}"));
             progress.inc(1);
         }
     }
     progress.finish_and_clear();
-    drive.summarise(&arguments.drive)
+    drive.summarise(&Summary::of(&plan, &exploration))?;
+    println!("{} ring frames, stopped by a wall in {}", exploration.frames(), exploration.rover().bumps());
+    Ok(())
 }
