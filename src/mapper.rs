@@ -12,6 +12,8 @@ const FRAMES_PER_HELLO: u16 = 100;
 
 /// How many slices of polishing are made between two places at most: more seldom find anything, and a robot may stand for days.
 const SLICES_PER_PLACE: u16 = 64;
+/// And how many while the best map does not explain what was observed.
+const SLICES_IN_DOUBT: u16 = 400;
 
 /// The settings of every stage; `C` are those of the filter.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -101,7 +103,7 @@ impl<const SONARS: usize, const V: usize, F: Filter<V>> Mapper<SONARS, V, F> {
     }
 
     /// Takes one frame of the ring; gives the place and the update when the robot has just been at one. The filter uses
-    /// up to 64 of the frames in between to polish its map.
+    /// up to 64 of the frames in between to polish its map, 400 while that does not explain what was observed.
     ///
     /// `turn` is what the drive knows of how the robot left the place before the one it may be at, `None` if nothing.
     /// `sonar_faults` are those of the ring's driver so far. Every message goes to `send`, which says whether the transmit
@@ -129,7 +131,7 @@ impl<const SONARS: usize, const V: usize, F: Filter<V>> Mapper<SONARS, V, F> {
         });
         if seen.is_some() {
             self.slices = 0;
-        } else if self.slices < SLICES_PER_PLACE {
+        } else if self.slices < if self.filter.is_in_doubt() { SLICES_IN_DOUBT } else { SLICES_PER_PLACE } {
             self.slices += 1;
             self.filter.polish();
         }

@@ -72,6 +72,11 @@ pub trait Filter<const V: usize>: Sized {
     /// The n-gram of the history that the best map explains worst.
     fn worst(&self) -> WorstNgram;
 
+    /// Whether the best map does not explain what was observed, so that more polishing is worth its while.
+    fn is_in_doubt(&self) -> bool {
+        false
+    }
+
     /// Writes what the filter knows, as much of it as there is room for, and brings the filter itself into the state that
     /// [`Filter::restore`] makes of it.
     ///
@@ -150,6 +155,10 @@ impl<const N: usize, const V: usize, const HISTORY: usize> Filter<V> for RobustF
 
     fn worst(&self) -> WorstNgram {
         self.worst()
+    }
+
+    fn is_in_doubt(&self) -> bool {
+        self.is_in_doubt()
     }
 
     #[cfg(feature = "snapshot")]

@@ -11,6 +11,9 @@ const ONE_Q16: f32 = 65536.0;
 /// The largest lead that is told, in nats.
 const LEAD_MAX: f32 = 15.0;
 
+/// The worst label of several hundred is some three and a half standard deviations off; the noise is an estimate as well.
+const EXPLAINED_DEVIATIONS: f32 = 5.0;
+
 impl<const N: usize, const V: usize, const HISTORY: usize> RobustFilter<N, V, HISTORY> {
     /// Tells the best map under the numbers that its vertices are known by.
     pub(super) fn publish(&mut self) -> Update {
@@ -105,6 +108,11 @@ impl<const N: usize, const V: usize, const HISTORY: usize> RobustFilter<N, V, HI
     /// The n-gram of the history that is farthest from every walk of the best map.
     pub fn worst(&self) -> WorstNgram {
         self.worst
+    }
+
+    /// Whether some n-gram of the history is farther from every walk of the best map than noise makes it.
+    pub fn is_in_doubt(&self) -> bool {
+        f32::from(self.worst.distance_mm) > EXPLAINED_DEVIATIONS * self.noise_mm()
     }
 
     /// The logarithm of the evidence of the best hypothesis, and what its map gains from other paths, in nats.
