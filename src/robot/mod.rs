@@ -48,6 +48,8 @@
 //! ```
 
 mod board;
+#[cfg(feature = "store")]
+mod boot;
 mod commands;
 mod config;
 

@@ -1,10 +1,9 @@
-//! What a robot does with its store when it starts.
+//! What a robot does with the snapshots in its store when it starts.
 
 use embedded_storage::nor_flash::NorFlash;
 
 use super::{Kept, Store, StoreError};
 use crate::snapshot::{Resume, SnapshotError};
-use crate::{Filter, Mapper, MapperConfig, MapperError};
 
 /// What a robot does with the newest snapshot when it starts.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -33,8 +32,6 @@ pub enum BootOutcome {
 /// What a start found in the store.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct BootReport {
-    /// The number of the start, which the robot introduces itself with.
-    pub start: u32,
     /// Where the map comes from.
     pub outcome: BootOutcome,
     /// How many snapshots were passed over.
@@ -45,25 +42,17 @@ pub struct BootReport {
     pub store: Option<StoreError>,
 }
 
-/// Starts a mapper and, as the policy says, goes on with the newest snapshot that can be taken: one that is damaged, of another
-/// version or other capacities gives way to the one before. The start is counted, and its number takes the place of
-/// `config.boot`. Where the store fails the mapper has started afresh.
-///
-/// # Errors
-/// [`MapperError`], as [`Mapper::start`].
-pub fn boot<const SONARS: usize, const V: usize, F: Filter<V>, FLASH: NorFlash>(
-    mapper: &mut Mapper<SONARS, V, F>,
-    config: &MapperConfig<SONARS, F::Config>,
+/// Goes on, as the policy says, with the newest snapshot that `restore` takes: one that is damaged, of another version or other
+/// capacities gives way to the one before. What is restored must have been started afresh, and stays so where nothing can be taken.
+pub fn resume<FLASH: NorFlash>(
     store: &mut Store<FLASH>,
     buffer: &mut [u8],
     policy: BootPolicy,
-) -> Result<BootReport, MapperError> {
-    let counted = store.count_start();
-    let start = counted.unwrap_or(config.boot);
-    mapper.start(&MapperConfig { boot: start, ..*config })?;
-    let mut report = BootReport { start, outcome: BootOutcome::Fresh, rejected: 0, why: None, store: counted.err() };
-    let resume = match policy {
-        BootPolicy::Fresh => return Ok(report),
+    mut restore: impl FnMut(&[u8], Resume) -> Result<(), SnapshotError>,
+) -> BootReport {
+    let mut report = BootReport { outcome: BootOutcome::Fresh, rejected: 0, why: None, store: None };
+    let place = match policy {
+        BootPolicy::Fresh => return report,
         BootPolicy::ContinueElsewhere => Resume::Elsewhere,
         BootPolicy::ContinueInPlace => Resume::InPlace,
     };
@@ -72,16 +61,16 @@ pub fn boot<const SONARS: usize, const V: usize, F: Filter<V>, FLASH: NorFlash>(
     loop {
         let kept = match next {
             Ok(Some(kept)) => kept,
-            Ok(None) => return Ok(report),
+            Ok(None) => return report,
             Err(error) => {
                 report.store = Some(error);
-                return Ok(report);
+                return report;
             }
         };
-        match mapper.restore(buffer.get(..kept.length).unwrap_or(&[]), resume) {
+        match restore(buffer.get(..kept.length).unwrap_or(&[]), place) {
             Ok(()) => {
                 report.outcome = BootOutcome::Continued(kept);
-                return Ok(report);
+                return report;
             }
             Err(error) => {
                 report.rejected = report.rejected.saturating_add(1);

@@ -22,13 +22,11 @@
 //! }
 //! ```
 
-#[cfg(feature = "wire")]
 mod boot;
 mod item;
 mod log;
 
-#[cfg(feature = "wire")]
-pub use boot::{BootOutcome, BootPolicy, BootReport, boot};
+pub use boot::{BootOutcome, BootPolicy, BootReport, resume};
 
 use core::fmt;
 use core::ops::Range;

@@ -1,8 +1,9 @@
 //! What a robot starts with.
 
 use super::*;
+use toposlam::MapperConfig;
 use toposlam::snapshot::SnapshotError;
-use toposlam::store::{BootOutcome, BootPolicy, BootReport, StoreError, boot};
+use toposlam::store::{BootOutcome, BootPolicy, BootReport, StoreError, resume};
 use toposlam::wire::Message;
 use toposlam::{FaultCounters, Filter};
 use toposlam_host::chip::{Cut, Tear};
@@ -13,9 +14,8 @@ type Robot16 = Box<reference::RobotMapper>;
 /// A robot that drove so far, and its store.
 fn after(places: u32, every: u32) -> (Robot16, Store<Sectors>) {
     let mut store = Store::mount(Sectors::new(8), reference::STORE).unwrap();
-    let mut mapper = Robot16::new(reference::RobotMapper::new());
+    let (mut mapper, ..) = start(&mut store, BootPolicy::Fresh);
     let mut buffer = [0; reference::SNAPSHOT_BYTES];
-    boot(&mut mapper, &reference::MAPPER, &mut store, &mut buffer, BootPolicy::Fresh).unwrap();
     let simulation = Simulation::new(&Plan::built_in("office").unwrap(), RobotModel::default(), 3).unwrap();
     for (frame, truth) in simulation {
         if mapper.observe(&frame, truth.turn, &FaultCounters::new(), |_| Ok(())).is_some() {
@@ -32,22 +32,25 @@ fn after(places: u32, every: u32) -> (Robot16, Store<Sectors>) {
     (mapper, store)
 }
 
-fn start(store: &mut Store<Sectors>, policy: BootPolicy) -> (Robot16, BootReport) {
+/// A robot that starts, what it found, and the number of the start as far as it could be counted.
+fn start(store: &mut Store<Sectors>, policy: BootPolicy) -> (Robot16, BootReport, Option<u32>) {
     let mut mapper = Robot16::new(reference::RobotMapper::new());
     let mut buffer = [0; reference::SNAPSHOT_BYTES];
-    let report = boot(&mut mapper, &reference::MAPPER, store, &mut buffer, policy).unwrap();
-    (mapper, report)
+    let number = store.count_start().ok();
+    mapper.start(&MapperConfig { boot: number.unwrap_or(0), ..reference::MAPPER }).unwrap();
+    let report = resume(store, &mut buffer, policy, |bytes, place| mapper.restore(bytes, place));
+    (mapper, report, number)
 }
 
 #[test]
 fn the_policy_says_whether_the_robot_goes_on_with_its_map() {
     let (mapper, mut store) = after(30, 10);
-    let (fresh, report) = start(&mut store, BootPolicy::Fresh);
-    assert_eq!((fresh.map().vertices(), report.outcome, report.start), (0, BootOutcome::Fresh, 2));
+    let (fresh, report, number) = start(&mut store, BootPolicy::Fresh);
+    assert_eq!((fresh.map().vertices(), report.outcome, number), (0, BootOutcome::Fresh, Some(2)));
     for (policy, number) in [(BootPolicy::ContinueElsewhere, 3), (BootPolicy::ContinueInPlace, 4)] {
-        let (restored, report) = start(&mut store, policy);
+        let (restored, report, start) = start(&mut store, policy);
         assert!(matches!(report.outcome, BootOutcome::Continued(_)), "{report:?}");
-        assert_eq!((report.start, report.rejected, report.store), (number, 0, None));
+        assert_eq!((start, report.rejected, report.store), (Some(number), 0, None));
         assert_eq!(map_digest(restored.map()), map_digest(mapper.map()));
         assert_eq!(restored.filter().observed(), 30);
     }
@@ -57,7 +60,7 @@ fn the_policy_says_whether_the_robot_goes_on_with_its_map() {
 fn the_robot_introduces_itself_with_the_number_of_its_start() {
     let mut store = Store::mount(Sectors::new(8), reference::STORE).unwrap();
     for number in 1..5 {
-        let (mut mapper, _) = start(&mut store, BootPolicy::default());
+        let (mut mapper, ..) = start(&mut store, BootPolicy::default());
         let mut said = None;
         let frame = toposlam::ring::RingFrame { echoes: [toposlam::ring::Echo::Silence; 16] };
         mapper.observe(&frame, None, &FaultCounters::new(), |message| {
@@ -76,11 +79,11 @@ fn snapshots_that_cannot_be_taken_give_way_to_the_one_before() {
     let mut damaged = newest(&mut store).unwrap();
     damaged[100] ^= 1;
     store.save(&damaged).unwrap();
-    let (restored, report) = start(&mut store, BootPolicy::ContinueElsewhere);
+    let (restored, report, _) = start(&mut store, BootPolicy::ContinueElsewhere);
     assert_eq!((report.rejected, report.why), (1, Some(SnapshotError::Corrupt)));
     assert_eq!(map_digest(restored.map()), map_digest(mapper.map()));
     store.save(b"something else").unwrap();
-    let (restored, report) = start(&mut store, BootPolicy::ContinueElsewhere);
+    let (restored, report, _) = start(&mut store, BootPolicy::ContinueElsewhere);
     assert_eq!((report.rejected, report.why), (2, Some(SnapshotError::Corrupt)));
     assert_eq!(restored.filter().observed(), 20);
     // Of another robot.
@@ -91,7 +94,7 @@ fn snapshots_that_cannot_be_taken_give_way_to_the_one_before() {
     writer.section(FILTER_SECTION, |section| Filter::save(&mut other, section)).unwrap();
     let length = writer.finish().unwrap();
     store.save(&buffer[..length]).unwrap();
-    let (_, report) = start(&mut store, BootPolicy::ContinueElsewhere);
+    let (_, report, _) = start(&mut store, BootPolicy::ContinueElsewhere);
     assert_eq!(report.rejected, 3);
 }
 
@@ -100,11 +103,11 @@ type RobustOther = toposlam::RobustFilter<10, 16, 100>;
 #[test]
 fn without_a_snapshot_or_without_a_flash_the_robot_starts_afresh() {
     let mut store = Store::mount(Sectors::new(8), reference::STORE).unwrap();
-    let (mapper, report) = start(&mut store, BootPolicy::ContinueInPlace);
+    let (mapper, report, _) = start(&mut store, BootPolicy::ContinueInPlace);
     assert_eq!((report.outcome, report.store, mapper.map().vertices()), (BootOutcome::Nothing, None, 0));
     let operation = store.flash_mut().operations();
     store.flash_mut().cut_power(Some(Cut { operation, tear: Tear::Done }));
-    let (mapper, report) = start(&mut store, BootPolicy::ContinueInPlace);
-    assert_eq!((report.outcome, report.start, mapper.map().vertices()), (BootOutcome::Nothing, 0, 0));
+    let (mapper, report, number) = start(&mut store, BootPolicy::ContinueInPlace);
+    assert_eq!((report.outcome, number, mapper.map().vertices()), (BootOutcome::Nothing, None, 0));
     assert!(matches!(report.store, Some(StoreError::Flash(_))));
 }

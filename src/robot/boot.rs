@@ -1,0 +1,29 @@
+//! The start of a robot with a flash.
+
+use embedded_storage::nor_flash::NorFlash;
+
+use super::{Robot, RobotConfig, RobotError};
+use crate::store::{BootPolicy, BootReport, Store, resume};
+use crate::wire::Staging;
+
+impl<'buffer, const SONARS: usize, const N: usize, const V: usize, const HISTORY: usize>
+    Robot<'buffer, SONARS, N, V, HISTORY>
+{
+    /// As [`Robot::start`]; then goes on with the newest snapshot in a store, as the policy says. Where the store fails the robot
+    /// has started afresh. A snapshot brings the settings of the filter with it.
+    ///
+    /// # Errors
+    /// As [`Robot::start`].
+    pub fn boot<FLASH: NorFlash>(
+        &mut self,
+        config: &RobotConfig<SONARS>,
+        buffer: &'buffer mut [u8],
+        store: &mut Store<FLASH>,
+        policy: BootPolicy,
+    ) -> Result<BootReport, RobotError> {
+        self.start(config, &mut [])?;
+        let report = resume(store, buffer, policy, |bytes, place| self.restore(bytes, place));
+        self.staging = Staging::new(buffer);
+        Ok(report)
+    }
+}
