@@ -53,6 +53,15 @@ pub(super) struct WaysOut {
     pub(super) came_by_first: bool,
 }
 
+/// How the robot left the place that was reported last. `Option<Turn>` would not be all zero, and a `static` robot would not lie
+/// in `.bss`.
+#[derive(Clone, Copy, Debug)]
+enum Left {
+    Unknown,
+    Back,
+    On,
+}
+
 /// The pilot's state: some 40 bytes.
 #[derive(Clone, Debug)]
 pub(super) struct Pilot {
@@ -65,7 +74,7 @@ pub(super) struct Pilot {
     target_mrad: i16,
     /// What the detector counted at the place.
     degree: Option<u8>,
-    turn: Option<Turn>,
+    left: Left,
     faults: FaultCounters,
 }
 
@@ -78,7 +87,7 @@ impl Pilot {
             back_mrad: 0,
             target_mrad: 0,
             degree: None,
-            turn: None,
+            left: Left::Unknown,
             faults: FaultCounters::new(),
         }
     }
@@ -108,7 +117,11 @@ impl Pilot {
     }
 
     pub(super) const fn turn(&self) -> Option<Turn> {
-        self.turn
+        match self.left {
+            Left::Unknown => None,
+            Left::Back => Some(Turn::Back),
+            Left::On => Some(Turn::On),
+        }
     }
 
     pub(super) const fn faults(&self) -> &FaultCounters {
@@ -118,7 +131,7 @@ impl Pilot {
     /// The detector has confirmed a place.
     pub(super) fn arrive(&mut self, degree: Option<u8>) {
         self.degree = degree;
-        self.turn = None;
+        self.left = Left::Unknown;
         self.enter(PilotState::Look);
     }
 
@@ -131,7 +144,7 @@ impl Pilot {
 
     /// What the pilot knew of its way holds no longer.
     pub(super) fn lose_way(&mut self) {
-        self.turn = None;
+        self.left = Left::Unknown;
         self.enter(PilotState::Follow);
     }
 
@@ -167,7 +180,7 @@ impl Pilot {
     /// Turns to where there is most room and starts over; how the robot left the last place says nothing any more.
     fn give_up<const SONARS: usize>(&mut self, scan: &Scan<'_, SONARS>) -> Suggestion {
         self.faults.count(FaultKind::DriveLost);
-        self.turn = None;
+        self.left = Left::Unknown;
         let most_room = scan.echoes().max_by_key(|(range_mm, _)| *range_mm);
         self.target_mrad = most_room.map_or(0, |(_, bearing_mrad)| bearing_mrad);
         self.enter(PilotState::Escape);
@@ -264,7 +277,11 @@ impl Pilot {
             self.enter(PilotState::Stand);
             return Suggestion::STAND;
         };
-        self.turn = back.map(|_| if chosen == 0 { Turn::Back } else { Turn::On });
+        self.left = match back {
+            None => Left::Unknown,
+            Some(_) if chosen == 0 => Left::Back,
+            Some(_) => Left::On,
+        };
         let index = (back.unwrap_or(0) + usize::from(chosen)).checked_rem(count).unwrap_or(0);
         self.target_mrad = bearings_mrad.get(index).copied().unwrap_or(0);
         self.enter(PilotState::Face);

@@ -6,6 +6,9 @@ use crate::drive::{self, Goal};
 use crate::snapshot::Resume;
 use crate::wire::{Command, Inbox, Info, Journey, JourneyState, Message, Outcome, Refusal, Setting, Settings, Version};
 
+/// No way to a vertex was told of.
+pub(super) const NOTHING: (Goal, drive::Journey) = (Goal::Explore, drive::Journey::None);
+
 impl<const SONARS: usize, const N: usize, const V: usize, const HISTORY: usize> Robot<'_, SONARS, N, V, HISTORY> {
     /// Takes what the line has received, and executes at most one command.
     pub(super) fn obey(&mut self, board: &mut impl Board) {
@@ -89,7 +92,7 @@ impl<const SONARS: usize, const N: usize, const V: usize, const HISTORY: usize> 
         drive.start(config.drive, config.mapper.seed).map_err(|_| Refusal::OutOfRange)?;
         self.localise_only = false;
         self.times_lost = 0;
-        self.journey = None;
+        self.told = NOTHING;
         Ok(())
     }
 
@@ -122,26 +125,26 @@ impl<const SONARS: usize, const N: usize, const V: usize, const HISTORY: usize> 
     }
 
     fn set_goal(&mut self, goal: Goal, board: &mut impl Board) {
-        if let Some(journey) = self.journey.filter(|journey| journey.state == JourneyState::Underway) {
-            let _ = self.send(&Message::Journey(Journey { state: JourneyState::Replaced, ..journey }), board);
+        if let (Goal::Vertex(vertex), drive::Journey::Underway) = self.told {
+            let _ = self.send(&Message::Journey(Journey { vertex, state: JourneyState::Replaced }), board);
         }
-        self.journey = None;
+        self.told = NOTHING;
         self.drive.set_goal(goal);
     }
 
     /// Tells how the way to a vertex goes, whenever that has changed.
     pub(super) fn tell_journey(&mut self, board: &mut impl Board) {
-        let Goal::Vertex(vertex) = self.drive.goal() else { return };
-        let state = match self.drive.journey() {
+        let now = (self.drive.goal(), self.drive.journey());
+        let (Goal::Vertex(vertex), journey) = now else { return };
+        let state = match journey {
             drive::Journey::None => return,
             drive::Journey::Underway => JourneyState::Underway,
             drive::Journey::Arrived => JourneyState::Arrived,
             drive::Journey::VertexGone => JourneyState::VertexGone,
             drive::Journey::TooLong => JourneyState::Lost,
         };
-        let journey = Journey { vertex, state };
-        if self.journey != Some(journey) && self.send(&Message::Journey(journey), board).is_ok() {
-            self.journey = Some(journey);
+        if self.told != now && self.send(&Message::Journey(Journey { vertex, state }), board).is_ok() {
+            self.told = now;
         }
     }
 }

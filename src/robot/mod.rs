@@ -56,7 +56,7 @@ mod config;
 pub use board::{Board, KeepError};
 pub use config::{RobotConfig, RobotError};
 
-use crate::drive::{Drive, Suggestion};
+use crate::drive::{Drive, Goal, Journey, Suggestion};
 use crate::place::Place;
 use crate::ring::RingFrame;
 use crate::snapshot::{DRIVE_SECTION, Resume, Snapshot, SnapshotError, SnapshotPolicy, Writer};
@@ -95,7 +95,8 @@ pub struct Robot<'buffer, const SONARS: usize, const N: usize, const V: usize, c
     turns: u32,
     last_turn_ms: Option<u32>,
     worst_turn_ms: u32,
-    journey: Option<wire::Journey>,
+    /// What the listener was last told of the way to a vertex.
+    told: (Goal, Journey),
 }
 
 impl<'buffer, const SONARS: usize, const N: usize, const V: usize, const HISTORY: usize>
@@ -108,7 +109,7 @@ impl<'buffer, const SONARS: usize, const N: usize, const V: usize, const HISTORY
             mapper: Mapper::new(),
             drive: Drive::new(),
             inbox: Inbox::new(),
-            staging: Staging::new(&mut []),
+            staging: Staging::without_buffer(),
             encoder: Encoder::new(0),
             faults: FaultCounters::new(),
             paused: false,
@@ -119,7 +120,7 @@ impl<'buffer, const SONARS: usize, const N: usize, const V: usize, const HISTORY
             turns: 0,
             last_turn_ms: None,
             worst_turn_ms: 0,
-            journey: None,
+            told: commands::NOTHING,
         }
     }
 
@@ -143,7 +144,7 @@ impl<'buffer, const SONARS: usize, const N: usize, const V: usize, const HISTORY
         self.turns = 0;
         self.last_turn_ms = None;
         self.worst_turn_ms = 0;
-        self.journey = None;
+        self.told = commands::NOTHING;
         Ok(())
     }
 

@@ -38,9 +38,12 @@ use crate::{FaultCounters, FaultKind};
 #[derive(Clone, Debug)]
 pub struct Inbox {
     decoder: Decoder<Request>,
-    waiting: Option<Request>,
-    /// The request that was executed last, and the reply to it.
-    answered: Option<(Request, Outcome)>,
+    /// Whether a request waits, and which. An `Option` would not be all zero, and a `static` inbox would not lie in `.bss`.
+    is_waiting: bool,
+    waiting: Request,
+    /// Whether a request was executed, the last one, and the reply to it.
+    has_answered: bool,
+    answered: (Request, Outcome),
     taken: u16,
     faults: FaultCounters,
 }
@@ -51,7 +54,16 @@ impl Inbox {
 
     /// An inbox that has received nothing.
     pub const fn new() -> Self {
-        Self { decoder: Decoder::new(), waiting: None, answered: None, taken: 0, faults: FaultCounters::new() }
+        const NONE: Request = Request { id: 0, command: Command::Info };
+        Self {
+            decoder: Decoder::new(),
+            is_waiting: false,
+            waiting: NONE,
+            has_answered: false,
+            answered: (NONE, Outcome::Done),
+            taken: 0,
+            faults: FaultCounters::new(),
+        }
     }
 
     /// Takes a byte of the line.
@@ -67,11 +79,12 @@ impl Inbox {
         match self.decoder.feed(&[byte]) {
             Progress::NeedsMore => {}
             Progress::Error { .. } => self.faults.count(FaultKind::WireCorrupt),
-            Progress::Message { message: request, .. } => match self.waiting {
-                None => self.waiting = Some(request),
-                Some(waiting) if waiting == request => {}
-                Some(_) => self.faults.count(FaultKind::CommandFlood),
-            },
+            Progress::Message { message: request, .. } if !self.is_waiting => {
+                self.is_waiting = true;
+                self.waiting = request;
+            }
+            Progress::Message { message: request, .. } if self.waiting == request => {}
+            Progress::Message { .. } => self.faults.count(FaultKind::CommandFlood),
         }
     }
 
@@ -79,18 +92,19 @@ impl Inbox {
     /// reply to be sent. Bytes are taken again from here on.
     pub fn turn(&mut self, execute: impl FnOnce(&Command) -> Outcome) -> Option<Reply> {
         self.taken = 0;
-        let request = self.waiting.take()?;
-        let outcome = match self.answered {
-            Some((answered, outcome)) if answered == request => outcome,
-            _ => {
-                let outcome = execute(&request.command);
-                if matches!(outcome, Outcome::Refused(_)) {
-                    self.faults.count(FaultKind::CommandRefused);
-                }
-                self.answered = Some((request, outcome));
-                outcome
+        if !core::mem::take(&mut self.is_waiting) {
+            return None;
+        }
+        let request = self.waiting;
+        if !self.has_answered || self.answered.0 != request {
+            let outcome = execute(&request.command);
+            if matches!(outcome, Outcome::Refused(_)) {
+                self.faults.count(FaultKind::CommandRefused);
             }
-        };
+            self.has_answered = true;
+            self.answered = (request, outcome);
+        }
+        let (_, outcome) = self.answered;
         Some(Reply { request: request.id, outcome })
     }
 

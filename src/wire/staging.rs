@@ -10,7 +10,7 @@ use super::{Chunk, Outcome, Refusal};
 /// the whole.
 #[derive(Debug)]
 pub struct Staging<'buffer> {
-    buffer: &'buffer mut [u8],
+    buffer: Option<&'buffer mut [u8]>,
     holds: Holds,
 }
 
@@ -32,7 +32,20 @@ enum Holds {
 impl<'buffer> Staging<'buffer> {
     /// Nothing in a buffer; a snapshot that is longer, or longer than 65535 bytes, is refused.
     pub const fn new(buffer: &'buffer mut [u8]) -> Self {
-        Self { buffer, holds: Holds::Nothing }
+        Self { buffer: Some(buffer), holds: Holds::Nothing }
+    }
+
+    /// Without a buffer every snapshot is too long.
+    pub const fn without_buffer() -> Self {
+        Self { buffer: None, holds: Holds::Nothing }
+    }
+
+    fn buffer(&self) -> &[u8] {
+        self.buffer.as_deref().unwrap_or(&[])
+    }
+
+    fn buffer_mut(&mut self) -> &mut [u8] {
+        self.buffer.as_deref_mut().unwrap_or(&mut [])
     }
 
     /// Takes a snapshot, and drops what the buffer held: `write` gets the buffer and tells how many bytes it wrote, `None` when it could not.
@@ -41,7 +54,8 @@ impl<'buffer> Staging<'buffer> {
     /// [`Refusal::TooLong`] when it could not, or says that it wrote more than there is room for.
     pub fn take(&mut self, write: impl FnOnce(&mut [u8]) -> Option<usize>) -> Result<(), Refusal> {
         self.holds = Holds::Nothing;
-        let length = write(self.buffer).filter(|&length| length <= self.buffer.len()).ok_or(Refusal::TooLong)?;
+        let length =
+            write(self.buffer_mut()).filter(|&length| length <= self.buffer().len()).ok_or(Refusal::TooLong)?;
         self.holds = Holds::Outgoing { length: u16::try_from(length).map_err(|_| Refusal::TooLong)? };
         Ok(())
     }
@@ -49,7 +63,7 @@ impl<'buffer> Staging<'buffer> {
     /// The whole snapshot that was taken; nothing when none was.
     pub fn taken(&self) -> &[u8] {
         let length = if let Holds::Outgoing { length } = self.holds { length } else { 0 };
-        self.buffer.get(..usize::from(length)).unwrap_or(&[])
+        self.buffer().get(..usize::from(length)).unwrap_or(&[])
     }
 
     /// The piece of the snapshot that was taken from a byte on; an [`Outcome::Snapshot`], empty at the end.
@@ -58,7 +72,7 @@ impl<'buffer> Staging<'buffer> {
     /// [`Refusal::NotNow`] when none was taken, [`Refusal::OutOfRange`] beyond its end.
     pub fn piece(&self, offset: u16) -> Result<Outcome, Refusal> {
         let Holds::Outgoing { length: total } = self.holds else { return Err(Refusal::NotNow) };
-        let rest = self.buffer.get(usize::from(offset)..usize::from(total)).ok_or(Refusal::OutOfRange)?;
+        let rest = self.buffer().get(usize::from(offset)..usize::from(total)).ok_or(Refusal::OutOfRange)?;
         Ok(Outcome::Snapshot { total, offset, bytes: Chunk::new(rest.iter().copied()) })
     }
 
@@ -67,7 +81,7 @@ impl<'buffer> Staging<'buffer> {
     /// # Errors
     /// [`Refusal::TooLong`] when the buffer is shorter.
     pub fn begin(&mut self, length: u16, crc: u32) -> Result<(), Refusal> {
-        if usize::from(length) > self.buffer.len() {
+        if usize::from(length) > self.buffer().len() {
             return Err(Refusal::TooLong);
         }
         self.holds = Holds::Incoming { length, crc, received: 0 };
@@ -86,11 +100,11 @@ impl<'buffer> Staging<'buffer> {
         }
         let end = usize::from(offset).saturating_add(bytes.len());
         let end = u16::try_from(end).ok().filter(|end| end <= length).ok_or(Refusal::OutOfRange)?;
-        let slots = self.buffer.get_mut(usize::from(offset)..usize::from(end)).ok_or(Refusal::OutOfRange)?;
+        *received = end.max(*received);
+        let slots = self.buffer_mut().get_mut(usize::from(offset)..usize::from(end)).ok_or(Refusal::OutOfRange)?;
         for (slot, &byte) in slots.iter_mut().zip(bytes) {
             *slot = byte;
         }
-        *received = end.max(*received);
         Ok(())
     }
 
@@ -103,7 +117,7 @@ impl<'buffer> Staging<'buffer> {
         if received < length {
             return Err(Refusal::MissingChunk);
         }
-        let bytes = self.buffer.get(..usize::from(length)).ok_or(Refusal::MissingChunk)?;
+        let bytes = self.buffer().get(..usize::from(length)).ok_or(Refusal::MissingChunk)?;
         if crc32(bytes) == crc { Ok(bytes) } else { Err(Refusal::BadCrc) }
     }
 }
