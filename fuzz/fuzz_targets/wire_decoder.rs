@@ -6,8 +6,8 @@ use std::fmt::Debug;
 use arbitrary::Arbitrary;
 use libfuzzer_sys::fuzz_target;
 use toposlam::wire::{
-    Arrival, DecodeError, Decoder, DecoderCounters, Encoder, Header, MAX_FRAME_BYTES, Message, Payload, Picture,
-    Progress, Request,
+    Arrival, DecodeError, Decoder, DecoderCounters, Encoder, Header, List, MAX_FRAME_BYTES, Message, Payload, Picture,
+    Progress, Renamed, Request, Row,
 };
 use toposlam_fuzz::line::{Line, Piece};
 
@@ -15,7 +15,55 @@ use toposlam_fuzz::line::{Line, Piece};
 struct Input<'a> {
     /// The lengths of the pieces in which the bytes are fed, over and over.
     splits: Vec<u8>,
-    pieces: Vec<Piece<'a>>,
+    parts: Vec<Part<'a>>,
+}
+
+#[derive(Arbitrary, Debug)]
+enum Part<'a> {
+    /// Anything.
+    Any(Piece<'a>),
+    /// A message about the map: it takes several to make a picture wrong.
+    Edge {
+        a: u8,
+        b: u8,
+        present: bool,
+    },
+    Vertex {
+        vertex: u8,
+    },
+    Row {
+        vertex: u8,
+        neighbours: u64,
+    },
+    Size {
+        vertices: u8,
+    },
+    Renamed {
+        names: &'a [u8],
+    },
+}
+
+impl Part<'_> {
+    fn bytes(&self, line: &mut Line) -> Vec<u8> {
+        let message = match *self {
+            Self::Any(ref piece) => return line.carry(piece),
+            Self::Edge { a, b, present } => Message::Edge { a: near(a), b: near(b), present },
+            Self::Vertex { vertex } => Message::Vertex { vertex: near(vertex), radius_mm: 1000, visits: 1 },
+            Self::Row { vertex, neighbours } => {
+                Message::Row(Row { vertex: near(vertex), radius_mm: 1000, visits: 1, neighbours })
+            }
+            Self::Size { vertices } => Message::Map { vertices: near(vertices), edges: 0, digest: 0 },
+            Self::Renamed { names } => {
+                Message::Renamed(Renamed { place_index: 0, names: List::new(names.iter().map(|&name| near(name))) })
+            }
+        };
+        line.say(&message)
+    }
+}
+
+/// The number of a vertex, most often one that the smaller maps have, or nearly.
+fn near(vertex: u8) -> u8 {
+    if vertex < 128 { vertex % 6 } else { vertex }
 }
 
 /// What a decoder handed out.
@@ -27,7 +75,7 @@ enum Heard<M> {
 
 fuzz_target!(|input: Input<'_>| {
     let mut line = Line::default();
-    let bytes: Vec<u8> = input.pieces.iter().flat_map(|piece| line.carry(piece)).collect();
+    let bytes: Vec<u8> = input.parts.iter().flat_map(|part| part.bytes(&mut line)).collect();
     let messages = listen::<Message>(&bytes, &input.splits);
     listen::<Request>(&bytes, &input.splits);
     draw::<64>(&messages);

@@ -1,7 +1,7 @@
 //! What a serial line carries: noise, and frames whose checksum is right, so that a fuzzer gets behind it.
 
 use arbitrary::Arbitrary;
-use toposlam::wire::{FRAME_VERSION, crc32};
+use toposlam::wire::{Encoder, FRAME_VERSION, MAX_FRAME_BYTES, Payload, crc32};
 
 /// The longest payload put into a frame: longer than any message, short enough for one block of COBS.
 const LONGEST_PAYLOAD: usize = 240;
@@ -64,6 +64,14 @@ impl Line {
                 bytes
             }
         }
+    }
+
+    /// The frame of a message or request that is due next.
+    pub fn say(&mut self, message: &impl Payload) -> Vec<u8> {
+        let mut buffer = [0; MAX_FRAME_BYTES];
+        let frame = Encoder::new(self.sequence).encode(message, &mut buffer).expect("there is room for every message");
+        self.sequence = self.sequence.wrapping_add(1);
+        frame.to_vec()
     }
 
     fn frame(&mut self, frame: &Frame<'_>) -> Vec<u8> {
