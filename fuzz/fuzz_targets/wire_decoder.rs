@@ -79,7 +79,6 @@ fuzz_target!(|input: Input<'_>| {
     let messages = listen::<Message>(&bytes, &input.splits);
     listen::<Request>(&bytes, &input.splits);
     draw::<64>(&messages);
-    draw::<16>(&messages);
     draw::<3>(&messages);
 });
 
@@ -162,21 +161,24 @@ fn comes_back<M: Payload + PartialEq + Debug>(message: &M) {
     }
 }
 
-/// Draws the map, which must be one after every message.
+/// Draws the map, which must be one whatever was heard.
 fn draw<const V: usize>(heard: &[Heard<Message>]) {
     let mut picture = Picture::<V>::new();
     for heard in heard {
         if let Heard::Message(header, message) = heard {
             picture.apply(*header, message);
-            check_picture(&picture);
+            if V < 16 {
+                check_picture(&picture);
+            }
         }
     }
+    check_picture(&picture);
 }
 
 fn check_picture<const V: usize>(picture: &Picture<V>) {
     let vertices = picture.vertices();
     assert!(usize::from(vertices) <= V);
-    for from in 0..64 {
+    for from in 0..=V as u8 {
         let row = picture.neighbours(from);
         for to in (0..64).filter(|to| row >> to & 1 == 1) {
             assert!(from < vertices && to < vertices, "an edge from {from} to {to} of {vertices}");

@@ -156,3 +156,20 @@ fn a_map_that_is_kept_as_it_is_has_no_room_for_what_is_new() {
     assert!(filter.map().edges().eq(before.edges()) && filter.map().labels() == before.labels());
     assert_eq!(filter.faults().of(FaultKind::VerticesFull), 0);
 }
+
+#[test]
+fn a_robot_that_localises_before_it_has_a_map_begins_to_map_when_it_may() {
+    let environment = six_rooms();
+    let mut robot = Robot::new(&environment, Hints::default(), 1);
+    let mut filter = Localiser::new(RobustFilter::new());
+    filter.start(RobustConfig { noise_mm: 15, ..RobustConfig::DEFAULT }, 1).unwrap();
+    filter.set_localise_only(true);
+    for index in 0..5 {
+        assert_eq!(filter.observe(robot.step()).place_index, index);
+        assert_eq!((filter.map().vertices(), filter.path().count()), (0, 0));
+    }
+    filter.set_localise_only(false);
+    let mut robot = Robot::new(&environment, Hints::default(), 1);
+    drive(&mut filter, &mut robot, 60);
+    assert!(robot.is_all_mapped_by(&*filter), "{:?}", filter.map().edges().collect::<Vec<_>>());
+}
