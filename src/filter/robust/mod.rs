@@ -198,7 +198,8 @@ impl<const N: usize, const V: usize, const HISTORY: usize> RobustFilter<N, V, HI
             self.beam.each(|hypothesis| have_faded |= hypothesis.settle_oldest(record));
             self.names.drop_oldest();
             self.record.drop_oldest();
-            if have_faded {
+            // A map that is kept has the counts it was kept with.
+            if have_faded && !self.localise_only {
                 self.rebase();
             }
         }
