@@ -94,7 +94,7 @@ impl Renamed {
     }
 
     /// Renumbers the vertices of a map, labels and rows; `labelled` are the vertices whose label is known, before and now.
-    /// Of vertices that are one now, the first one's label stays, and the edges of all.
+    /// Of vertices that are one now, the first one's label stays, and the edges of all; a vertex beyond `V` is left out.
     pub(super) fn apply<const V: usize>(
         &self,
         labels: &mut [(u16, u32); V],
@@ -108,7 +108,8 @@ impl Renamed {
         for ((before, label), row) in (0..).zip(labels_before).zip(neighbours_before) {
             let Some(now) = self.now(before) else { continue };
             let Some(slot) = neighbours.get_mut(usize::from(now)) else { continue };
-            *slot |= bits(row).filter_map(|other| self.now(other)).fold(0, |row, other| row | bit(other));
+            let neighbours_now = bits(row).filter_map(|other| self.now(other)).filter(|&now| usize::from(now) < V);
+            *slot |= neighbours_now.fold(0, |row, other| row | bit(other));
             if labelled & bit(before) != 0
                 && labelled_now & bit(now) == 0
                 && let Some(slot) = labels.get_mut(usize::from(now))

@@ -214,3 +214,20 @@ impl<const V: usize> Default for Picture<V> {
         Self::new()
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::wire::List;
+
+    #[test]
+    fn an_edge_to_a_vertex_that_is_renamed_beyond_the_capacity_is_left_out() {
+        let header = Header { sequence: 0, arrival: Arrival::InOrder };
+        let mut picture = Picture::<3>::new();
+        picture.apply(header, &Message::Edge { a: 0, b: 1, present: true });
+        picture.apply(header, &Message::Edge { a: 1, b: 1, present: true });
+        picture.apply(header, &Message::Renamed(Renamed { place_index: 0, names: List::new([5, 0]) }));
+        assert_eq!(picture.neighbours(0), 0b1);
+        assert!(picture.edges().eq([(0, 0)]));
+    }
+}

@@ -17,9 +17,13 @@ fn known<const V: usize>(environment: &Environment, visits: u32) -> Map<V> {
 type Localiser = Box<RobustFilter<10, 16, 64>>;
 
 fn localiser(environment: &Environment, seed: u64) -> Localiser {
+    localiser_with(&known(environment, 20), seed)
+}
+
+fn localiser_with(map: &Map<16>, seed: u64) -> Localiser {
     let mut filter = Localiser::new(RobustFilter::new());
     let config = RobustConfig { noise_mm: 15, ..RobustConfig::DEFAULT };
-    filter.start_with_map(config, seed, &known(environment, 20)).unwrap();
+    filter.start_with_map(config, seed, map).unwrap();
     filter.set_localise_only(true);
     filter
 }
@@ -155,4 +159,36 @@ fn a_map_that_is_kept_as_it_is_has_no_room_for_what_is_new() {
     }
     assert!(filter.map().edges().eq(before.edges()) && filter.map().labels() == before.labels());
     assert_eq!(filter.faults().of(FaultKind::VerticesFull), 0);
+}
+
+#[test]
+fn a_map_that_is_kept_stays_when_the_counts_of_its_vertices_fade() {
+    let environment = six_rooms();
+    let mut robot = Robot::new(&environment, Hints::default(), 1);
+    // So many visits that they fade with the first place that leaves the history.
+    let mut filter = localiser_with(&known(&environment, 600), 1);
+    filter.observe(robot.step());
+    let before = *filter.map();
+    for _ in 0..10 {
+        look_around(&mut filter, &mut robot);
+        robot.carry_off(false);
+        assert_eq!(*filter.map(), before);
+    }
+}
+
+#[test]
+fn a_robot_that_localises_before_it_has_a_map_begins_to_map_when_it_may() {
+    let environment = six_rooms();
+    let mut robot = Robot::new(&environment, Hints::default(), 1);
+    let mut filter = Localiser::new(RobustFilter::new());
+    filter.start(RobustConfig { noise_mm: 15, ..RobustConfig::DEFAULT }, 1).unwrap();
+    filter.set_localise_only(true);
+    for index in 0..5 {
+        assert_eq!(filter.observe(robot.step()).place_index, index);
+        assert_eq!((filter.map().vertices(), filter.path().count()), (0, 0));
+    }
+    filter.set_localise_only(false);
+    let mut robot = Robot::new(&environment, Hints::default(), 1);
+    drive(&mut filter, &mut robot, 60);
+    assert!(robot.is_all_mapped_by(&*filter), "{:?}", filter.map().edges().collect::<Vec<_>>());
 }

@@ -124,6 +124,19 @@ fn contents_that_are_cut_or_too_long_are_refused() {
 }
 
 #[test]
+fn a_snapshot_without_any_hypothesis_is_refused_because_no_filter_could_go_on_with_it() {
+    let mut filter = Box::new(Small::new());
+    filter.start(RobustConfig { hypotheses: 3, ..RobustConfig::DEFAULT }, 1).unwrap();
+    let bytes = contents(&saved(&mut filter, ROOM).unwrap());
+    assert!(bears(&bytes));
+    // Vertices, the place before, whether counts left the history, surplus and faded: all there is of a hypothesis of nothing.
+    let (rest, _hypothesis) = bytes.split_at(bytes.len() - 11);
+    let (count, before) = rest.split_last().unwrap();
+    assert_eq!(*count, 1);
+    assert!(!bears(&[before, &[0]].concat()));
+}
+
+#[test]
 fn a_filter_with_other_capacities_refuses_by_that_name() {
     let drive = &drives(8)[0];
     let mut filter = drive.start::<3, 6, 12>();

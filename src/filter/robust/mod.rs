@@ -181,7 +181,8 @@ impl<const N: usize, const V: usize, const HISTORY: usize> RobustFilter<N, V, HI
     }
 
     /// Whether the map is kept as it is from now on: the filter then only tells where the robot is, notices by itself when
-    /// it was carried elsewhere, and makes no moves. The places seen meanwhile count as evidence when mapping goes on.
+    /// it was carried elsewhere, and makes no moves. The places seen meanwhile count as evidence when mapping goes on. A map
+    /// without vertices stays without, and the places are lost.
     pub fn set_localise_only(&mut self, localise_only: bool) {
         if localise_only == self.localise_only {
             return;
@@ -202,7 +203,13 @@ impl<const N: usize, const V: usize, const HISTORY: usize> RobustFilter<N, V, HI
     /// Cost: N · (V + 1) predictions, and for each move and once more some passes over the record, each O(HISTORY · V).
     pub fn observe(&mut self, observation: impl Into<Observation>) -> Update {
         let mut observation: Observation = observation.into();
-        observation.begins |= self.observed == 0;
+        if self.localise_only && self.beam.get(0).is_none_or(|best| best.vertices == 0) {
+            // No hypothesis could say where it is, so none would live on.
+            let place_index = self.observed;
+            self.observed = self.observed.wrapping_add(1);
+            return Update { place_index, ..Update::NONE };
+        }
+        observation.begins |= self.record.is_empty();
         if self.record.is_full() {
             self.faults.count(FaultKind::HistoryFull);
             let record = &self.record;
@@ -210,7 +217,8 @@ impl<const N: usize, const V: usize, const HISTORY: usize> RobustFilter<N, V, HI
             self.beam.each(|hypothesis| have_faded |= hypothesis.settle_oldest(record));
             self.names.drop_oldest();
             self.record.drop_oldest();
-            if have_faded {
+            // A map that is kept has the counts it was kept with.
+            if have_faded && !self.localise_only {
                 self.rebase();
             }
         }

@@ -66,6 +66,10 @@ impl<const T: usize> Record<T> {
         self.len
     }
 
+    pub(super) fn is_empty(&self) -> bool {
+        self.len == 0
+    }
+
     pub(super) fn is_full(&self) -> bool {
         self.len == T
     }

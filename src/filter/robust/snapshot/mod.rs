@@ -102,11 +102,11 @@ impl<const N: usize, const V: usize, const HISTORY: usize> RobustFilter<N, V, HI
         self.record.read(&mut from, len, kept)?;
         let told_vertices = self.read_told(&mut from, len, kept)?;
         let count = from.u8()?;
-        if count > head.config.hypotheses {
+        if count == 0 || count > head.config.hypotheses {
             return Err(SnapshotError::Contents);
         }
         self.draft.clear();
-        if head.localise_only && count > 0 {
+        if head.localise_only {
             self.draft.read_kept(&mut from)?;
             if self.draft.vertices != told_vertices {
                 return Err(SnapshotError::Contents);

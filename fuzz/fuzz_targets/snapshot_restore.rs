@@ -1,0 +1,170 @@
+//! Any bytes for a snapshot, with a right checksum or without, and true snapshots that were changed.
+#![no_main]
+
+use std::sync::LazyLock;
+
+use arbitrary::Arbitrary;
+use libfuzzer_sys::fuzz_target;
+use toposlam::Observation;
+use toposlam::snapshot::{FILTER_SECTION, SNAPSHOT_VERSION, SnapshotError, Writer};
+use toposlam::wire::crc32;
+use toposlam_fuzz::filters::{self, Seen, Small};
+
+/// How many places are observed behind a restore.
+const PLACES: usize = 30;
+/// Behind how many of them the filter only localises, or maps again.
+const SWITCH_AT: usize = 20;
+/// For how many of them a second filter, restored from the first one, is held to it.
+const WITH_TWIN: usize = 8;
+
+#[derive(Arbitrary, Debug)]
+struct Input<'a> {
+    /// What the robot sees behind the restore, over and over.
+    seen: Vec<Seen>,
+    source: Source<'a>,
+}
+
+#[derive(Arbitrary, Debug)]
+enum Source<'a> {
+    /// A true snapshot's contents, changed; the checksum is right.
+    Changed { which: u8, edits: Vec<Edit<'a>> },
+    /// The contents of the filter's section.
+    Contents(&'a [u8]),
+    /// All sections; header and checksum are right.
+    Sections(&'a [u8]),
+    /// The whole.
+    Whole(&'a [u8]),
+    /// A true snapshot whose checksum does not follow the changes.
+    Damaged { which: u8, edits: Vec<Edit<'a>> },
+}
+
+#[derive(Arbitrary, Debug)]
+enum Edit<'a> {
+    Set { at: u16, byte: u8 },
+    Add { at: u16, what: i8 },
+    Insert { at: u16, bytes: &'a [u8] },
+    Remove { at: u16, count: u8 },
+    Cut { to: u16 },
+}
+
+/// True snapshots: of filters that saw nothing, little, more than they remember, that know a map, and that only localise.
+static TRUE: LazyLock<Vec<Vec<u8>>> = LazyLock::new(|| {
+    let mut localising = filters::after(30);
+    localising.set_localise_only(true);
+    let mut known = filters::with_map();
+    let mut lost = filters::with_map();
+    lost.set_localise_only(true);
+    for index in 30..75 {
+        localising.observe(filters::walk(index));
+        lost.observe(filters::walk(index));
+    }
+    (0..9).for_each(|index| _ = known.observe(filters::walk(index)));
+    [filters::after(0), filters::after(7), filters::after(33), filters::after(90), localising, known, lost]
+        .map(|mut filter| filters::saved(&mut filter))
+        .into()
+});
+
+/// A filter that goes on with a snapshot, or without.
+static BEFORE: LazyLock<Box<Small>> = LazyLock::new(|| filters::after(12));
+
+fuzz_target!(|input: Input<'_>| {
+    let snapshot = snapshot(&input.source);
+    let mut filter = BEFORE.clone();
+    let before = filters::saved(&mut filter);
+    let mut twin = filter.clone();
+    let restored = filters::contents(&snapshot).and_then(|contents| filter.restore(contents));
+    if let Err(error) = restored {
+        assert_ne!(error, SnapshotError::Full);
+        assert_eq!(filters::saved(&mut filter), before, "a refused snapshot changes nothing");
+        assert_eq!(filter.observe(filters::walk(12)), twin.observe(filters::walk(12)));
+        assert_eq!(filters::saved(&mut filter), filters::saved(&mut twin), "nor what comes later");
+        return;
+    }
+    goes_on(&mut filter, &input.seen);
+});
+
+/// The snapshot that is restored.
+fn snapshot(source: &Source<'_>) -> Vec<u8> {
+    match source {
+        Source::Changed { which, edits } => {
+            let snapshot = &TRUE[usize::from(*which) % TRUE.len()];
+            let contents = &snapshot[15..snapshot.len() - 4];
+            of_contents(&edited(contents, edits))
+        }
+        Source::Contents(contents) => of_contents(contents),
+        Source::Sections(sections) => {
+            let mut snapshot = b"TSLM".to_vec();
+            snapshot.extend(SNAPSHOT_VERSION.to_le_bytes());
+            snapshot.extend((sections.len() as u32 + 14).to_le_bytes());
+            snapshot.extend(*sections);
+            snapshot.extend(crc32(&snapshot).to_le_bytes());
+            snapshot
+        }
+        Source::Whole(snapshot) => snapshot.to_vec(),
+        Source::Damaged { which, edits } => edited(&TRUE[usize::from(*which) % TRUE.len()], edits),
+    }
+}
+
+fn of_contents(contents: &[u8]) -> Vec<u8> {
+    let mut snapshot = vec![0; contents.len() + 19];
+    let mut writer = Writer::new(&mut snapshot).unwrap();
+    writer.section(FILTER_SECTION, |section| section.bytes(contents)).unwrap();
+    assert_eq!(writer.finish(), Ok(snapshot.len()));
+    snapshot
+}
+
+fn edited(bytes: &[u8], edits: &[Edit<'_>]) -> Vec<u8> {
+    let mut bytes = bytes.to_vec();
+    for edit in edits {
+        let length = bytes.len();
+        let within = |at: u16| usize::from(at) % length.max(1);
+        match *edit {
+            Edit::Set { at, byte } => bytes.iter_mut().skip(within(at)).take(1).for_each(|slot| *slot = byte),
+            Edit::Add { at, what } => {
+                bytes.iter_mut().skip(within(at)).take(1).for_each(|slot| *slot = slot.wrapping_add_signed(what));
+            }
+            Edit::Insert { at, bytes: more } => _ = bytes.splice(within(at)..within(at), more.iter().copied()),
+            Edit::Remove { at, count } => {
+                bytes.drain(within(at)..length.min(within(at) + usize::from(count)));
+            }
+            Edit::Cut { to } => bytes.truncate(within(to)),
+        }
+    }
+    bytes
+}
+
+/// Whatever a snapshot said, the filter is one that can go on.
+fn goes_on(filter: &mut Small, seen: &[Seen]) {
+    let mut twin = again(filter);
+    // Up to 255 moves at a place are allowed, and would be all that is fuzzed.
+    let places = (4 * PLACES / (4 + usize::from(filters::moves(filter)))).max(1);
+    let mut seen = seen.iter().copied().map(Seen::observation).cycle();
+    for index in 0..places {
+        let observation: Observation = seen.next().unwrap_or_else(|| filters::walk(index));
+        let update = filter.observe(observation);
+        filters::check(filter, &update);
+        if index < WITH_TWIN {
+            assert_eq!(twin.observe(observation), update, "the restored filter does as the saved one does");
+        }
+        if index % 4 == 1 {
+            filter.polish();
+            twin.polish();
+        }
+        if index + 1 == WITH_TWIN {
+            assert_eq!(filters::saved(filter), filters::saved(&mut twin));
+        }
+        if index + 1 == SWITCH_AT {
+            filter.set_localise_only(observation.degree.is_some());
+        }
+    }
+    again(filter);
+}
+
+/// Saves a filter and restores it elsewhere; its snapshot is the same there.
+fn again(filter: &mut Small) -> Box<Small> {
+    let snapshot = filters::saved(filter);
+    let mut twin = BEFORE.clone();
+    assert_eq!(filters::contents(&snapshot).and_then(|contents| twin.restore(contents)), Ok(()));
+    assert_eq!(filters::saved(&mut twin), snapshot, "a snapshot comes back");
+    twin
+}

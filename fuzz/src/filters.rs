@@ -1,0 +1,125 @@
+//! A small robust filter, what a robot may see, and what holds of a filter whatever it saw.
+
+use arbitrary::Arbitrary;
+use toposlam::snapshot::{FILTER_SECTION, Reader, Snapshot, SnapshotError, Writer};
+use toposlam::{Fingerprint, Map, Observation, RobustConfig, RobustFilter, Turn, Update};
+
+/// The most hypotheses of a [`Small`] filter.
+pub const HYPOTHESES: usize = 4;
+/// The most vertices of its maps.
+pub const VERTICES: usize = 8;
+/// A filter that is quick to run.
+pub type Small = RobustFilter<HYPOTHESES, VERTICES, 40>;
+
+/// The settings of a small filter.
+pub const CONFIG: RobustConfig = RobustConfig { hypotheses: HYPOTHESES as u8, ..RobustConfig::DEFAULT };
+
+/// Where the contents of the filter's section have the number of moves at a place.
+const MOVES_AT: usize = 9;
+
+/// What a robot sees of a place.
+#[derive(Arbitrary, Clone, Copy, Debug)]
+pub struct Seen {
+    steps: u16,
+    hints: u8,
+}
+
+impl Seen {
+    /// The same as an observation.
+    pub fn observation(self) -> Observation {
+        Observation {
+            fingerprint: Fingerprint::from_steps(self.steps % (Fingerprint::MAX.steps() + 1)).unwrap(),
+            turn: match self.hints & 3 {
+                0 => Some(Turn::Back),
+                1 => Some(Turn::On),
+                _ => None,
+            },
+            degree: (self.hints & 4 != 0).then_some(self.hints >> 4),
+            begins: self.hints & 0xF8 == 0xF8,
+        }
+    }
+}
+
+/// A place of a walk through seven rooms, some alike; the same numbers give the same walk.
+pub fn walk(index: usize) -> Observation {
+    let room = index * index % 11 % 7;
+    let steps = [400, 580, 400, 760, 1000, 1010, 1400][room] + (index * 5 % 13) as u16;
+    Observation {
+        turn: [None, Some(Turn::On), Some(Turn::Back)][index % 3],
+        degree: index.is_multiple_of(4).then_some(1 + room as u8 / 2),
+        begins: index == 17,
+        ..Observation::new(Fingerprint::from_steps(steps).unwrap())
+    }
+}
+
+/// A small filter after so many places of the walk.
+pub fn after(places: usize) -> Box<Small> {
+    let mut filter = Box::new(Small::new());
+    filter.start(CONFIG, 1).unwrap();
+    for index in 0..places {
+        filter.observe(walk(index));
+        (0..index % 4).for_each(|_| filter.polish());
+    }
+    filter
+}
+
+/// A small filter that knows a map.
+pub fn with_map() -> Box<Small> {
+    let mut map = Map::new();
+    for radius_mm in [900, 1300, 1700, 2100, 2500] {
+        map.add_vertex(Fingerprint::from_radius_mm(radius_mm).unwrap()).unwrap();
+    }
+    [(0, 1), (1, 2), (2, 3), (3, 4), (4, 0), (0, 2)].iter().for_each(|&(a, b)| map.add_edge(a, b));
+    let mut filter = Box::new(Small::new());
+    filter.start_with_map(CONFIG, 2, &map).unwrap();
+    filter
+}
+
+/// The whole snapshot of a filter.
+pub fn saved(filter: &mut Small) -> Vec<u8> {
+    let mut buffer = [0; Small::SNAPSHOT_BYTES];
+    let mut writer = Writer::new(&mut buffer).unwrap();
+    writer.section(FILTER_SECTION, |section| filter.save(section)).expect("there is room for all of it");
+    let length = writer.finish().unwrap();
+    buffer[..length].to_vec()
+}
+
+/// The contents of the filter's section.
+pub fn contents(snapshot: &[u8]) -> Result<Reader<'_>, SnapshotError> {
+    Snapshot::open(snapshot)?.section(FILTER_SECTION).ok_or(SnapshotError::Contents)
+}
+
+/// How many moves a filter makes at each place.
+pub fn moves(filter: &mut Small) -> u8 {
+    let snapshot = saved(filter);
+    *contents(&snapshot).unwrap().bytes(MOVES_AT + 1).unwrap().last().unwrap()
+}
+
+/// Checks what holds of every filter behind an update.
+pub fn check(filter: &Small, update: &Update) {
+    let map = filter.map();
+    let vertices = map.vertices();
+    let is_vertex = |vertex: u8| vertex < vertices;
+    assert!(usize::from(vertices) <= VERTICES);
+    for from in 0..64 {
+        let row = map.neighbours(from);
+        for to in (0..64).filter(|to| row >> to & 1 == 1) {
+            assert!(is_vertex(from) && is_vertex(to), "an edge from {from} to {to} of {vertices}");
+            assert!(map.neighbours(to) >> from & 1 == 1, "the edge from {from} to {to} does not lead back");
+        }
+        assert_eq!(map.label(from).is_some(), is_vertex(from));
+        assert!(filter.renamed(from).is_none_or(is_vertex));
+        assert!(filter.place_probability_q16(from) <= 65_600);
+    }
+    assert!(filter.path().all(is_vertex));
+    if vertices == 0 {
+        // It only localises, and has no map to do that in.
+        return;
+    }
+    assert_eq!(filter.path().last(), Some(update.vertex));
+    assert!(filter.worst().walk().iter().copied().all(is_vertex));
+    assert!((1..=1 << 16).contains(&filter.map_probability_q16()));
+    assert!((1..=HYPOTHESES).contains(&usize::from(update.distinct)));
+    let (evidence, surplus) = filter.evidence();
+    assert!(evidence.is_finite() && surplus.is_finite() && filter.noise_mm().is_finite());
+}
