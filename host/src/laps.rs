@@ -172,15 +172,10 @@ impl fmt::Display for Laps {
                 } else {
                     format!("vertex {} instead of {}", Named(visit.vertex), Named(first.vertex))
                 };
-                format!("{} at {}, {vertex}", first.frame, position(visit))
+                format!("{} at {} ({vertex})", first.frame, position(visit))
             });
-            let told: Vec<String> = told.collect();
-            writeln!(
-                f,
-                "  {again} of {expected} places of lap 1 come again in lap {}: {}",
-                number + 1,
-                told.join("; ")
-            )?;
+            let number = number + 1;
+            writeln!(f, "  {again} of {expected} places of lap 1 come again in lap {number}: {}", listed(told))?;
             let missing = lap.missing.iter().map(|visit| visit.frame.to_string());
             let extra = lap.extra.iter().map(|visit| position(visit).to_string());
             writeln!(f, "  missing: {}; extra: {}", listed(missing), listed(extra))?;
@@ -323,7 +318,7 @@ mod tests {
         assert_eq!(two.again, [(visits[0], visits[2]), (visits[1], visits[3])]);
         assert_eq!((&two.extra, &three.extra), (&vec![], &vec![]));
         assert_eq!((&three.visits, &three.missing), (&vec![visits[3]], &vec![visits[0], visits[1]]));
-        assert!(laps.to_string().contains("98 at 103, vertex 1 again"), "{laps}");
+        assert!(laps.to_string().contains("98 at 103 (vertex 1 again)"), "{laps}");
     }
 
     #[test]
@@ -350,10 +345,10 @@ mod tests {
             "laps of 100 frames; a place comes again within 10 frames of its position and 150 mm of its radius",
             "lap 1: 20 (1000 mm, vertex 3), 80 (2000 mm, vertex 1)",
             "lap 2: 21 (1000 mm, vertex 3), 50 (500 mm, vertex 2)",
-            "  1 of 2 places of lap 1 come again in lap 2: 20 at 21, vertex 3 again",
+            "  1 of 2 places of lap 1 come again in lap 2: 20 at 21 (vertex 3 again)",
             "  missing: 80; extra: 50",
             "lap 3: 18 (1000 mm, vertex 4), 81 (2000 mm, vertex -)",
-            "  2 of 2 places of lap 1 come again in lap 3: 20 at 18, vertex 4 instead of 3; 80 at 81, vertex - instead of 1",
+            "  2 of 2 places of lap 1 come again in lap 3: 20 at 18 (vertex 4 instead of 3), 80 at 81 (vertex - instead of 1)",
             "  missing: none; extra: none",
             "in all, places of lap 1 come again 3 of 4 times, 1 of them as the same vertex",
         ];
