@@ -116,7 +116,8 @@ impl Ring {
         let mut places = Vec::new();
         for column in &self.columns {
             let Some(place) = headers.iter().position(|header| header == column) else {
-                bail!("the recording has no column {column:?}");
+                let first = headers.get(0).unwrap_or("");
+                bail!("no column {column:?}: the first line must name the columns, and begins with {first:?}");
             };
             places.push(place);
         }
@@ -172,6 +173,8 @@ mod tests {
         let ring = Ring::parse(FOUR).unwrap();
         assert!(ring.read("a,b,c\n1,2,3".as_bytes()).unwrap_err().to_string().contains("\"d\""));
         assert!(ring.read("a,b,c,d\n1,2,3".as_bytes()).is_err());
+        let no_header = ring.read("0.438,2,3,4".as_bytes()).unwrap_err().to_string();
+        assert_eq!(no_header, "no column \"a\": the first line must name the columns, and begins with \"0.438\"");
     }
 
     #[test]

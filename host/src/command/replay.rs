@@ -1,12 +1,16 @@
 //! `toposlam replay`: map a recording of ring ranges.
 
 use std::fs::File;
+use std::num::NonZeroU32;
 use std::path::PathBuf;
 
 use anyhow::Context;
 use clap::Args;
-use toposlam::Map;
+use toposlam::{Map, reference};
+use toposlam_host::evaluation::graph::Graph;
+use toposlam_host::laps::{Laps, Named, Shape, Tolerance, Visit};
 use toposlam_host::mapping::Mapping;
+use toposlam_host::nearness::Nearness;
 use toposlam_host::recording::{Ring, fault_lines};
 
 use super::filter::FilterArgument;
@@ -22,6 +26,9 @@ pub(crate) struct Arguments {
     /// The filter that makes the map.
     #[arg(long, value_enum, default_value_t = FilterArgument::Robust)]
     filter: FilterArgument,
+    /// How many frames a lap takes, when the robot drove one round over and over: compares the laps.
+    #[arg(long)]
+    lap_frames: Option<NonZeroU32>,
 }
 
 pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
@@ -44,12 +51,20 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
         }
     }
     println!("\n{} frames, {} places", frames.len(), mapping.steps().len());
-    let path: Vec<String> = mapping
-        .path()
-        .into_iter()
-        .map(|vertex| vertex.map_or_else(|| "-".to_owned(), |vertex| vertex.to_string()))
-        .collect();
-    println!("by the final map the places were: {}", path.join(" "));
+    println!("{}", Nearness::of(&frames, &ring.geometry(), &reference::PLACE));
+    let path = mapping.path();
+    let vertices: Vec<String> = path.iter().map(|vertex| Named(*vertex).to_string()).collect();
+    println!("by the final map the places were: {}", vertices.join(" "));
+    if let Some(lap_frames) = arguments.lap_frames {
+        let places = mapping.steps().iter().map(|step| step.place);
+        let visits = places.zip(path).map(|(place, vertex)| Visit {
+            frame: place.frame_index,
+            radius_mm: place.fingerprint.radius_mm(),
+            vertex,
+        });
+        let visits: Vec<Visit> = visits.collect();
+        println!("\n{}\n", Laps::compare(&visits, lap_frames, frames.len() as u32, Tolerance::of(lap_frames)));
+    }
     print_map(mapping.map());
     for line in fault_lines(&mapping.faults()) {
         println!("fault {line}");
@@ -63,6 +78,8 @@ fn print_map<const V: usize>(map: &Map<V>) {
     for (vertex, label) in (0..map.vertices()).zip(map.labels()) {
         println!("  vertex {vertex:2}: radius {:4} mm, {} visits", label.radius_mm(), map.visits(vertex));
     }
-    let edges: Vec<String> = edges.iter().map(|(a, b)| format!("{a}-{b}")).collect();
-    println!("  edges: {}", edges.join(" "));
+    let texts: Vec<String> = edges.iter().map(|(a, b)| format!("{a}-{b}")).collect();
+    println!("  edges: {}", texts.join(" "));
+    let graph = Graph::from_edges(map.vertices().into(), edges.iter().map(|&(a, b)| (a.into(), b.into())));
+    println!("  the map is {}", Shape::of(&graph));
 }

@@ -1,0 +1,113 @@
+//! How near to the Voronoi graph a recorded robot drove.
+//!
+//! The place detector finds what a robot comes by that keeps to the generalised Voronoi graph, where the two nearest obstacles are
+//! equally close. How much of a recording is such a drive says how much of it can give places.
+
+use std::fmt;
+
+use toposlam::place::PlaceConfig;
+use toposlam::ring::{Echo, RingFrame, RingGeometry};
+
+/// How many frames there are, and how many of them show the Voronoi graph.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Nearness {
+    /// All frames.
+    pub frames: usize,
+    /// Those with a second obstacle about as near as the nearest.
+    pub on_graph: usize,
+    /// Those with a third one, too.
+    pub at_meet_point: usize,
+    /// What counts as equally near, in millimetres.
+    pub equidistance_mm: u16,
+}
+
+impl Nearness {
+    /// Measures a recording with the place detector's notion of obstacles, but frame by frame, without its smoothing.
+    pub fn of<const SONARS: usize>(
+        frames: &[RingFrame<SONARS>],
+        geometry: &RingGeometry<SONARS>,
+        config: &PlaceConfig,
+    ) -> Self {
+        let mut nearness = Self { frames: frames.len(), equidistance_mm: config.equidistance_mm, ..Self::default() };
+        for frame in frames {
+            let nearest_mm = nearest_mm(frame, geometry, config);
+            let is_near = |number: usize| {
+                let range_mm = nearest_mm.get(number);
+                range_mm.is_some_and(|range_mm| range_mm - nearest_mm[0] <= config.equidistance_mm)
+            };
+            nearness.on_graph += usize::from(is_near(1));
+            nearness.at_meet_point += usize::from(is_near(2));
+        }
+        nearness
+    }
+}
+
+/// The ranges of the nearest three obstacles in separate bearings, the nearest first.
+fn nearest_mm<const SONARS: usize>(
+    frame: &RingFrame<SONARS>,
+    geometry: &RingGeometry<SONARS>,
+    config: &PlaceConfig,
+) -> Vec<u16> {
+    let heard = frame.echoes.iter().zip(&geometry.bearings_mrad).filter_map(|(echo, bearing_mrad)| match echo {
+        Echo::Range { range_mm } if (config.range_min_mm..=config.range_max_mm).contains(range_mm) => {
+            Some((*range_mm, *bearing_mrad))
+        }
+        _ => None,
+    });
+    let mut heard: Vec<(u16, i16)> = heard.collect();
+    heard.sort_unstable();
+    let mut nearest: Vec<(u16, i16)> = Vec::new();
+    for (range_mm, bearing_mrad) in heard {
+        let is_apart = |&(_, other_mrad): &(u16, i16)| {
+            let turn_mrad = i32::from(bearing_mrad).abs_diff(other_mrad.into());
+            turn_mrad.min(6283_u32.saturating_sub(turn_mrad)) >= config.separation_mrad.into()
+        };
+        if nearest.len() < 3 && nearest.iter().all(is_apart) {
+            nearest.push((range_mm, bearing_mrad));
+        }
+    }
+    nearest.into_iter().map(|(range_mm, _)| range_mm).collect()
+}
+
+impl fmt::Display for Nearness {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let percent = |count: usize| 100.0 * count as f64 / self.frames.max(1) as f64;
+        write!(
+            f,
+            "the two nearest obstacles are equally near (within {} mm) in {:.0} % of the frames, the three nearest in {:.0} %",
+            self.equidistance_mm,
+            percent(self.on_graph),
+            percent(self.at_meet_point),
+        )
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_frame_is_on_the_graph_when_two_obstacles_in_separate_bearings_are_equally_near() {
+        // Eight sonars, 45 degrees apart: two neighbours are one obstacle, and the last is a neighbour of the first.
+        let frame = |ranges_mm: [u16; 8]| RingFrame { echoes: ranges_mm.map(|range_mm| Echo::Range { range_mm }) };
+        let measured = |ranges_mm| {
+            let config = PlaceConfig { separation_mrad: 1047, equidistance_mm: 150, ..PlaceConfig::DEFAULT };
+            let nearness = Nearness::of(&[frame(ranges_mm)], &RingGeometry::even(), &config);
+            (nearness.on_graph, nearness.at_meet_point)
+        };
+        assert_eq!(measured([500, 510, 900, 900, 900, 900, 900, 520]), (0, 0));
+        assert_eq!(measured([500, 900, 900, 900, 650, 900, 900, 900]), (1, 0));
+        assert_eq!(measured([500, 900, 900, 900, 651, 900, 900, 900]), (0, 0));
+        assert_eq!(measured([500, 900, 600, 900, 650, 900, 900, 900]), (1, 1));
+        assert_eq!(measured([500, 900, 20, 900, 9000, 900, 900, 900]), (0, 0), "nonsense and silence are no obstacles");
+        assert_eq!(measured([7000; 8]), (0, 0));
+    }
+
+    #[test]
+    fn the_text_gives_shares_of_all_frames() {
+        let nearness = Nearness { frames: 8, on_graph: 4, at_meet_point: 2, equidistance_mm: 150 };
+        let text = nearness.to_string();
+        assert!(text.contains("150 mm") && text.contains("50 %") && text.contains("25 %"), "{text}");
+        assert!(!Nearness::default().to_string().contains("NaN"));
+    }
+}
