@@ -108,6 +108,7 @@ impl<const SONARS: usize, const V: usize, F: Filter<V>> Mapper<SONARS, V, F> {
     /// `turn` is what the drive knows of how the robot left the place before the one it may be at, `None` if nothing.
     /// `sonar_faults` are those of the ring's driver so far. Every message goes to `send`, which says whether the transmit
     /// queue took it.
+    #[inline(never)]
     pub fn observe(
         &mut self,
         frame: &RingFrame<SONARS>,

@@ -22,9 +22,14 @@ use cortex_m_semihosting::{debug, hprintln};
 use defmt_rtt as _;
 use static_cell::ConstStaticCell;
 use toposlam::{
-    Filter as _, Fingerprint, Observation, RobustConfig, RobustFilter, Turn, Update,
-    reference::{self, Detector, Filter, HISTORY, PaperReference, RobotMapper, SONARS, VERTICES},
+    FaultCounters, Filter as _, Fingerprint, Observation, RobustConfig, RobustFilter, Turn, Update,
+    drive::{Drive, Suggestion},
+    reference::{
+        self, Detector, Filter, HISTORY, PaperReference, ReferenceRobot, RobotMapper, SNAPSHOT_BYTES, SONARS, VERTICES,
+    },
     ring::{Echo, RingFrame},
+    robot::{Board, KeepError},
+    snapshot::Writer,
     wire::{
         Capacities, Chunk, Command, Encoder, Hello, Inbox, MAX_FRAME_BYTES, Outcome, QueueFull, Reporter, Request,
         ResetCause,
@@ -107,6 +112,8 @@ const LARGE_FILTER: RobustConfig = RobustConfig { hypotheses: MORE as u8, ..refe
 /// One filter after the other in the same memory: all of them do not fit beside each other.
 #[allow(clippy::large_enum_variant)]
 enum Filters {
+    /// The whole robot.
+    Whole(ReferenceRobot<'static>),
     Robot(Filter),
     Paper(PaperReference),
     Large(LargeFilter),
@@ -233,6 +240,60 @@ fn detect(clock: &Clock, detector: &mut Detector, costs: &mut FrameCosts) -> usi
     places
 }
 
+/// A board that takes everything and does nothing.
+struct Bare;
+
+impl Board for Bare {
+    fn receive(&mut self) -> Option<u8> {
+        None
+    }
+
+    fn send(&mut self, frame: &[u8]) -> Result<(), QueueFull> {
+        black_box(frame);
+        Ok(())
+    }
+
+    fn follow(&mut self, suggestion: Suggestion) {
+        black_box(suggestion);
+    }
+
+    fn feed_watchdog(&mut self) {}
+
+    fn now_ms(&mut self) -> u32 {
+        0
+    }
+
+    fn stack_high_water_bytes(&mut self) -> u32 {
+        0
+    }
+
+    fn keep(&mut self, _: &[u8]) -> Result<(), KeepError> {
+        Err(KeepError::NoStore)
+    }
+}
+
+/// Recorded frames through the whole robot, drive and messages included; the turns at places are those of the filter.
+fn turns(clock: &Clock, robot: &mut ReferenceRobot<'static>, costs: &mut FrameCosts) {
+    let Ok(()) = robot.start(&reference::ROBOT, &mut []) else { panic!() };
+    for ranges_mm in &FRAMES_MM {
+        let echo = |range_mm| if range_mm == 0 { Echo::Silence } else { Echo::Range { range_mm } };
+        let frame = RingFrame { echoes: ranges_mm.map(echo) };
+        let (instructions, seen) = clock.measure(|| robot.turn(black_box(&frame), &FaultCounters::new(), &mut Bare));
+        if seen.is_none() {
+            costs.push(instructions);
+        }
+    }
+}
+
+/// Saves a filter with a full history; tells what that costs and how many bytes the snapshot has.
+fn save(clock: &Clock, filter: &mut Filter, buffer: &mut [u8]) -> (u64, usize) {
+    clock.measure(|| {
+        let Ok(mut writer) = Writer::new(buffer) else { panic!() };
+        let Ok(()) = filter.save(&mut writer) else { panic!() };
+        writer.finish().unwrap_or(0)
+    })
+}
+
 /// What the full rate of a line of 115,200 baud costs the inbox in a turn of 130 ms, at worst: requests of the shortest and
 /// of the longest kind, and garbage.
 fn flood(clock: &Clock, inbox: &mut Inbox) -> u64 {
@@ -264,6 +325,8 @@ fn main() -> ! {
     static REPORTER: ConstStaticCell<Reporter<VERTICES>> = ConstStaticCell::new(Reporter::new());
     static COSTS: ConstStaticCell<[PlaceCosts; 6]> = ConstStaticCell::new([const { PlaceCosts::new() }; 6]);
     static SLICE_COSTS: ConstStaticCell<SliceCosts> = ConstStaticCell::new(Costs::new());
+    static TURN_COSTS: ConstStaticCell<FrameCosts> = ConstStaticCell::new(Costs::new());
+    static SNAPSHOT: ConstStaticCell<[u8; SNAPSHOT_BYTES]> = ConstStaticCell::new([0; SNAPSHOT_BYTES]);
     static INBOX: ConstStaticCell<Inbox> = ConstStaticCell::new(Inbox::new());
     static DETECTOR_COSTS: ConstStaticCell<FrameCosts> = ConstStaticCell::new(Costs::new());
 
@@ -285,6 +348,9 @@ fn main() -> ! {
         let report = |filter: &Filter, update: &Update| wire.report(clock, filter, update);
         run(clock, filter, reference::FILTER, Told::TurnAndDegree, (both_costs, slices), report);
         slices.print("robust_both_instructions_per_slice");
+        let (instructions, bytes) = save(clock, filter, SNAPSHOT.take());
+        hprintln!("snapshot_instructions: {}", instructions);
+        hprintln!("snapshot_bytes: {}", bytes);
     }
     *filters = const { Filters::Paper(PaperReference::new()) };
     if let Filters::Paper(filter) = filters {
@@ -307,6 +373,14 @@ fn main() -> ! {
     wire.costs.print("report_instructions_per_place");
     hprintln!("report_bytes_per_place_worst: {}", wire.largest_bytes);
     hprintln!("inbox_instructions_per_turn_worst: {}", flood(clock, INBOX.take()));
+    let turn_frames = TURN_COSTS.take();
+    *filters = const { Filters::Whole(ReferenceRobot::new()) };
+    if let Filters::Whole(robot) = filters {
+        turns(clock, robot, turn_frames);
+    }
+    turn_frames.print("turn_instructions_per_frame");
+    hprintln!("robot_bytes: {}", size_of::<ReferenceRobot<'_>>());
+    hprintln!("drive_bytes: {}", size_of::<Drive<VERTICES, HISTORY>>());
     hprintln!("inbox_bytes: {}", size_of::<Inbox>());
     hprintln!("frames: {}", FRAMES_MM.len());
     hprintln!("frames_places_detected: {}", places_detected);

@@ -6,7 +6,7 @@
 //!                                  ▲ turn hint, back to the filter
 //! ```
 //!
-//! The [`Pilot`](pilot) keeps the robot equidistant from the two closest obstacles, homes in on the point where a third is as
+//! The `Pilot` keeps the robot equidistant from the two closest obstacles, homes in on the point where a third is as
 //! close, stands there until the detector reports the place, and leaves by the way that the navigator names. It tells ways
 //! apart by their order in bearing, beginning with the one it came by; nothing is metric and there is no odometry. The
 //! navigator knows what it did at each place of the history; with the filter's best path that tells which way of a place leads to
@@ -74,6 +74,7 @@ impl<const V: usize, const HISTORY: usize> Drive<V, HISTORY> {
     /// Takes what the detector and the filter made of a ring frame, and says where to go.
     ///
     /// `seen` is what the mapper said of the frame.
+    #[inline(never)]
     pub fn advance<const SONARS: usize, F: Filter<V>>(
         &mut self,
         detector: &PlaceDetector<SONARS>,

@@ -11,6 +11,7 @@ pub(super) const NOTHING: (Goal, drive::Journey) = (Goal::Explore, drive::Journe
 
 impl<const SONARS: usize, const N: usize, const V: usize, const HISTORY: usize> Robot<'_, SONARS, N, V, HISTORY> {
     /// Takes what the line has received, and executes at most one command.
+    #[inline(never)]
     pub(super) fn obey(&mut self, board: &mut impl Board) {
         for _ in 0..RECEIVED_PER_TURN {
             let Some(byte) = board.receive() else { break };

@@ -181,6 +181,7 @@ impl<'buffer, const SONARS: usize, const N: usize, const V: usize, const HISTORY
         seen
     }
 
+    #[inline(never)]
     fn map_and_drive(
         &mut self,
         frame: &RingFrame<SONARS>,
@@ -213,6 +214,7 @@ impl<'buffer, const SONARS: usize, const N: usize, const V: usize, const HISTORY
     }
 
     /// Writes a snapshot of the drive and the mapper into the buffer, for the flash.
+    #[inline(never)]
     fn keep_snapshot(&mut self, board: &mut impl Board) {
         let Self { mapper, drive, staging, .. } = self;
         let kept = staging.take(|buffer| snapshot(mapper, drive, buffer).ok()).map(|()| board.keep(staging.taken()));
@@ -230,6 +232,7 @@ impl<'buffer, const SONARS: usize, const N: usize, const V: usize, const HISTORY
     ///
     /// # Errors
     /// [`SnapshotError`] says what is wrong with the bytes; nothing has changed then, and the fault is counted.
+    #[inline(never)]
     pub fn restore(&mut self, bytes: &[u8], resume: Resume) -> Result<(), SnapshotError> {
         let Self { mapper, drive, .. } = self;
         let restored = restore(mapper, drive, bytes, resume);
