@@ -57,6 +57,8 @@ fn main() -> ! {
     proof::mapper();
     proof::wire();
     proof::commands();
+    proof::drive();
+    proof::robot();
     #[cfg(teeth)]
     black_box(can_panic(black_box(&[1, 2, 3])));
     loop {

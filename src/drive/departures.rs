@@ -131,7 +131,7 @@ impl<const HISTORY: usize> Departures<HISTORY> {
             known.filter_map(|ago| {
                 let (ways, exit) = self.exit(ago).filter(|(ways, _)| *ways == count)?;
                 let from = filter.recent(ago + 1)?;
-                (filter.recent(ago) == Some(here)).then_some((from, exit % ways, filter.recent(ago - 1)?))
+                (filter.recent(ago) == Some(here)).then_some((from, exit.checked_rem(ways)?, filter.recent(ago - 1)?))
             })
         };
         let number = |way_to: &[Option<u8>; V], vertex: u8| way_to.get(usize::from(vertex)).copied().flatten();

@@ -136,7 +136,8 @@ impl<const SONARS: usize> Scan<'_, SONARS> {
     /// The ways that lead on between equidistant obstacles, counter-clockwise: in each gap the middle of the sensors that look
     /// so much farther than the radius that they cannot hear a corner.
     pub(crate) fn ways(&self, closest: &Closest) -> Ways {
-        let mut ways = Ways { bearings_mrad: [0; OBSTACLES], len: 0 };
+        // Empty slots sort behind every bearing.
+        let mut ways = Ways { bearings_mrad: [i16::MAX; OBSTACLES], len: 0 };
         let radius_mm = closest.radius_mm();
         let bearings = closest.equidistant().map(|obstacle| obstacle.bearing_mrad);
         for from_mrad in bearings.clone() {
@@ -152,14 +153,15 @@ impl<const SONARS: usize> Scan<'_, SONARS> {
             });
             let (count, sum_mrad) =
                 open.fold((0i32, 0i32), |(count, sum), within_mrad| (count + 1, sum.saturating_add(within_mrad)));
-            if let (Some(middle_mrad), Some(slot)) = (sum_mrad.checked_div(count), ways.bearings_mrad.get_mut(ways.len))
-            {
-                *slot = turned(from_mrad, middle_mrad);
+            if let Some(middle_mrad) = sum_mrad.checked_div(count) {
+                let mut carried_mrad = turned(from_mrad, middle_mrad);
+                for slot in &mut ways.bearings_mrad {
+                    if carried_mrad < *slot {
+                        core::mem::swap(slot, &mut carried_mrad);
+                    }
+                }
                 ways.len += 1;
             }
-        }
-        if let Some(bearings) = ways.bearings_mrad.get_mut(..ways.len) {
-            bearings.sort_unstable();
         }
         ways
     }

@@ -1,5 +1,6 @@
 //! Calls of every public function of the library, by module.
 
+mod robot;
 mod sonar;
 
 use core::{
@@ -23,6 +24,7 @@ use toposlam::{
     },
 };
 
+pub(crate) use robot::{drive, robot};
 pub(crate) use sonar::sonar;
 
 const PARTICLES: usize = 10;
