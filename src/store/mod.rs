@@ -268,7 +268,6 @@ impl<FLASH: NorFlash> Store<FLASH> {
     }
 
     #[inline(never)]
-
     fn newest_below(&mut self, below: u32, buffer: &mut [u8]) -> Result<Option<Kept>, StoreError> {
         let mut below = below;
         loop {
@@ -352,7 +351,6 @@ impl<FLASH: NorFlash> Store<FLASH> {
     }
 
     #[inline(never)]
-
     fn push_starts(&mut self, half: usize) -> Result<Push, StoreError> {
         let (serial, starts) = (self.next_serial(), self.starts);
         self.push(half, &Item::Starts { serial, starts })
