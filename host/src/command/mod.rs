@@ -10,3 +10,4 @@ mod filter;
 mod rails;
 pub(crate) mod replay;
 pub(crate) mod simulate;
+pub(crate) mod soak;
