@@ -96,6 +96,8 @@ pub struct Exploration<'buffer> {
     nodes: Vec<Option<usize>>,
     steps: Vec<Step>,
     frames: u64,
+    /// Frames while the robot paused: its detector does not number them.
+    frames_not_taken: u32,
 }
 
 impl<'buffer> Exploration<'buffer> {
@@ -123,6 +125,7 @@ impl<'buffer> Exploration<'buffer> {
             nodes: Vec::new(),
             steps: Vec::new(),
             frames: 0,
+            frames_not_taken: 0,
         })
     }
 
@@ -143,8 +146,10 @@ impl<'buffer> Exploration<'buffer> {
         self.board.now_ms = self.board.now_ms.wrapping_add(FRAME_MS);
         self.frames += 1;
         let seen = self.robot.turn(frame, &self.ring_faults, &mut self.board);
+        self.frames_not_taken += u32::from(self.robot.is_paused());
         if let Some((place, update)) = &seen {
-            self.nodes.push(self.journal.detect(place).node);
+            let frame_index = place.frame_index.saturating_add(self.frames_not_taken);
+            self.note(&Place { frame_index, ..*place });
             let map = self.robot.mapper().map();
             let (vertices, edges) = (map.vertices(), map.edges().count());
             self.steps.push(Step { place: *place, update: *update, vertices, edges });

@@ -65,7 +65,7 @@ pub struct Account {
     pub wire_corrupt: u64,
     /// Requests beyond one in a turn, and turns with too many bytes.
     pub command_flood: u64,
-    /// Refusals among the robot's replies.
+    /// Requests that the robot's replies refuse.
     pub command_refused: u64,
     /// Places beyond the room of the history.
     pub history_full: u64,
@@ -193,6 +193,8 @@ struct Auditor {
     account: Account,
     arriving: Decoder<Request>,
     departing: Decoder,
+    /// The number of the request that was answered last.
+    replied: Option<u16>,
     is_paused: bool,
 }
 
@@ -221,10 +223,12 @@ impl Auditor {
 
     /// What the robot said in its turn.
     fn depart(&mut self, bytes: &[u8], operator: &Operator) {
-        let Self { account, departing, is_paused, .. } = self;
+        let Self { account, departing, replied, is_paused, .. } = self;
         each(departing, bytes, |message| {
             let Message::Reply(reply) = message else { return };
-            account.command_refused += u64::from(matches!(reply.outcome, Outcome::Refused(_)));
+            // A request that came again is answered again, and not executed.
+            let is_executed = replied.replace(reply.request) != Some(reply.request);
+            account.command_refused += u64::from(is_executed && matches!(reply.outcome, Outcome::Refused(_)));
             if let Some(Command::Pause { on }) = operator.awaits(reply.request) {
                 *is_paused = on;
             }
@@ -237,8 +241,7 @@ impl Auditor {
             return;
         }
         let place = toposlam::reference::PLACE;
-        let is_nonsense =
-            |echo: &&Echo| matches!(echo, Echo::Range { range_mm } if *range_mm < place.range_min_mm);
+        let is_nonsense = |echo: &&Echo| matches!(echo, Echo::Range { range_mm } if *range_mm < place.range_min_mm);
         let nonsense = frame.echoes.iter().filter(is_nonsense).count();
         let live = SONARS - nonsense - frame.dead_sensors().count();
         self.account.sonar_nonsense += nonsense as u64;

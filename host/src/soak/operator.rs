@@ -2,9 +2,7 @@
 
 use std::collections::VecDeque;
 
-use toposlam::wire::{
-    CHUNK_BYTES, Chunk, Command, Encoder, MAX_FRAME_BYTES, Outcome, Reply, Request, Setting, crc32,
-};
+use toposlam::wire::{CHUNK_BYTES, Chunk, Command, Encoder, MAX_FRAME_BYTES, Outcome, Reply, Request, Setting, crc32};
 
 /// A request that was not answered within so many turns of the robot's loop is sent again.
 const PATIENCE_TURNS: u32 = 3;
