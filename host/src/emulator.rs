@@ -11,7 +11,7 @@ use std::{
     path::{Path, PathBuf},
     process::{Child, Command, ExitStatus, Stdio},
     sync::{
-        Arc,
+        Arc, Mutex,
         atomic::{AtomicBool, AtomicU64, Ordering},
     },
     thread,
@@ -21,7 +21,8 @@ use std::{
 use anyhow::{Context, bail};
 use toposlam::ring::RingFrame;
 
-use crate::chip::{Sc18im700, Srf08Bank};
+use crate::chip::Srf08Bank;
+use crate::injector::{BridgeCounts, FaultRates, FaultyBridge};
 
 /// The RAM of the STM32F405 that the stack grows down in.
 const RAM_START: u32 = 0x2000_0000;
@@ -29,6 +30,9 @@ const RAM_BYTES: usize = 128 * 1024;
 /// What `cortex-m-rt` paints the stack with before `main`.
 const STACK_PAINT: [u8; 4] = 0xCCCC_CCCC_u32.to_le_bytes();
 const BUFFER_BYTES: usize = 4096;
+/// The firmware waits for a byte that was lost until it has been woken so many times; the clock alone takes 20 s for that. With
+/// faults, a zero on USART1 wakes it whenever the line to the bridge was quiet for this long: between frames zeros mean nothing.
+const WAKE_AFTER: Duration = Duration::from_millis(1);
 
 /// What to run and for how long.
 #[derive(Clone, Debug)]
@@ -46,6 +50,10 @@ pub struct Emulation {
     pub blind_frames: u64,
     /// After that the run ends when USART1 has been quiet for this long.
     pub quiet: Duration,
+    /// Faults between the firmware and its sensors, from the world's first frame to its last.
+    pub faults: FaultRates,
+    /// The seed of the faults.
+    pub fault_seed: u64,
 }
 
 impl Emulation {
@@ -58,11 +66,14 @@ impl Emulation {
             timeout: Duration::from_secs(600),
             blind_frames: 64,
             quiet: Duration::from_millis(500),
+            faults: FaultRates::NONE,
+            fault_seed: 0,
         }
     }
 
     /// Runs the firmware in the world until the frames are used up and USART1 is quiet, or `received` breaks off, or the
-    /// firmware ends on its own. `received` gets what the firmware sends on USART1, in pieces of any length.
+    /// firmware ends on its own. `received` gets what the firmware sends on USART1, in pieces of any length; what it puts into its
+    /// second argument is sent to the firmware.
     ///
     /// # Errors
     /// When the emulator cannot be started or talked to, when the firmware ends with a failure (a panic or a hard
@@ -70,7 +81,7 @@ impl Emulation {
     pub fn run(
         &self,
         frames: impl FnMut() -> Option<RingFrame<16>> + Send,
-        mut received: impl FnMut(&[u8]) -> ControlFlow<()>,
+        mut received: impl FnMut(&[u8], &mut Vec<u8>) -> ControlFlow<()>,
     ) -> anyhow::Result<Outcome> {
         if !self.elf.is_file() {
             bail!("no firmware image at {}: build it with `cargo firmware`", self.elf.display());
@@ -84,14 +95,16 @@ impl Emulation {
         let monitor = machine.accept(&monitor, deadline)?;
 
         let progress = Arc::new(Progress::default());
-        let ending = thread::scope(|scope| {
+        let to_firmware = Mutex::new(usart1.try_clone()?);
+        let (ending, bridge) = thread::scope(|scope| {
             let stop = usart2.try_clone()?;
-            let bus = scope.spawn(|| self.play_bus(usart2, frames, &progress));
-            let ending = self.listen_until_the_end(&mut machine, &mut usart1, &progress, deadline, &mut received);
+            let bus = scope.spawn(|| self.play_bus(usart2, frames, &progress, &to_firmware));
+            let ending =
+                self.listen_until_the_end(&mut machine, &mut usart1, &progress, deadline, &to_firmware, &mut received);
             // Closing the line ends the thread that waits on it.
             let _ = stop.shutdown(std::net::Shutdown::Both);
             match bus.join() {
-                Ok(_) => ending,
+                Ok(counts) => ending.map(|ending| (ending, counts)),
                 Err(_) => bail!("the model of the sensor bus failed"),
             }
         })?;
@@ -106,6 +119,7 @@ impl Emulation {
                 frames: progress.frames.load(Ordering::Relaxed),
                 bus_bytes: progress.bus_bytes.load(Ordering::Relaxed),
                 stack_high_water_bytes,
+                bridge,
                 seconds: started.elapsed().as_secs_f64(),
             }),
         }
@@ -114,21 +128,45 @@ impl Emulation {
     /// Answers the firmware's bytes on USART2 as the bridge and the rangers behind it would, until the line closes.
     fn play_bus(
         &self,
-        mut line: TcpStream,
+        line: TcpStream,
         frames: impl FnMut() -> Option<RingFrame<16>>,
         progress: &Progress,
+        to_firmware: &Mutex<TcpStream>,
+    ) -> BridgeCounts {
+        let mut bridge = FaultyBridge::new(Srf08Bank::new(frames, self.ranging_polls), self.faults, self.fault_seed);
+        // The line fails when the emulator ends.
+        let _ = self.answer_bus(line, &mut bridge, progress, to_firmware);
+        bridge.counts()
+    }
+
+    fn answer_bus<WORLD: FnMut() -> Option<RingFrame<16>>>(
+        &self,
+        mut line: TcpStream,
+        bridge: &mut FaultyBridge<Srf08Bank<WORLD>>,
+        progress: &Progress,
+        to_firmware: &Mutex<TcpStream>,
     ) -> io::Result<()> {
-        let mut chip = Sc18im700::new(Srf08Bank::new(frames, self.ranging_polls));
+        let has_faults = self.faults != FaultRates::NONE;
+        line.set_read_timeout(has_faults.then_some(WAKE_AFTER))?;
         let mut buffer = [0; BUFFER_BYTES];
         loop {
-            let count = line.read(&mut buffer)?;
-            if count == 0 {
-                return Ok(());
-            }
-            let answer: Vec<u8> = buffer[..count].iter().flat_map(|&byte| chip.byte(byte)).collect();
+            let count = match line.read(&mut buffer) {
+                Ok(0) => return Ok(()),
+                Ok(count) => count,
+                Err(error) if is_timeout(&error) => {
+                    if bridge.devices().frames() > 0 {
+                        send(to_firmware, &[0])?;
+                    }
+                    continue;
+                }
+                Err(error) => return Err(error),
+            };
+            let answer: Vec<u8> = buffer[..count].iter().flat_map(|&byte| bridge.byte(byte)).collect();
+            let (frames, blind_frames) = (bridge.devices().frames(), bridge.devices().blind_frames());
+            bridge.set_faulty(has_faults && frames > 0 && blind_frames == 0);
             progress.bus_bytes.fetch_add(count as u64, Ordering::Relaxed);
-            progress.frames.store(chip.devices.frames(), Ordering::Relaxed);
-            if chip.devices.blind_frames() > self.blind_frames {
+            progress.frames.store(frames, Ordering::Relaxed);
+            if blind_frames > self.blind_frames {
                 progress.world_over.store(true, Ordering::Release);
             } else if !answer.is_empty() {
                 line.write_all(&answer)?;
@@ -142,19 +180,23 @@ impl Emulation {
         usart1: &mut TcpStream,
         progress: &Progress,
         deadline: Instant,
-        received: &mut impl FnMut(&[u8]) -> ControlFlow<()>,
+        to_firmware: &Mutex<TcpStream>,
+        received: &mut impl FnMut(&[u8], &mut Vec<u8>) -> ControlFlow<()>,
     ) -> anyhow::Result<Ending> {
         usart1.set_read_timeout(Some(Duration::from_millis(20)))?;
         let mut buffer = [0; BUFFER_BYTES];
+        let mut answer = Vec::new();
         let mut last_byte = Instant::now();
         loop {
             match usart1.read(&mut buffer) {
                 Ok(0) => return machine.wait_for_exit(deadline),
                 Ok(count) => {
                     last_byte = Instant::now();
-                    if received(&buffer[..count]).is_break() {
+                    if received(&buffer[..count], &mut answer).is_break() {
                         return Ok(Ending::BrokenOff);
                     }
+                    send(to_firmware, &answer).context("writing USART1")?;
+                    answer.clear();
                 }
                 Err(error) if is_timeout(&error) => {}
                 Err(error) if error.kind() == io::ErrorKind::ConnectionReset => return machine.wait_for_exit(deadline),
@@ -206,6 +248,8 @@ pub struct Outcome {
     pub bus_bytes: u64,
     /// The most stack that the firmware ever used, from the paint that is left.
     pub stack_high_water_bytes: Option<usize>,
+    /// What was done between the firmware and its sensors.
+    pub bridge: BridgeCounts,
     /// How long the run took on this computer.
     pub seconds: f64,
 }
@@ -292,6 +336,12 @@ fn listen() -> anyhow::Result<TcpListener> {
     TcpListener::bind("127.0.0.1:0").context("opening a local port for the emulator")
 }
 
+/// Writes all of some bytes at once, so that nobody else's come in between.
+fn send(line: &Mutex<TcpStream>, bytes: &[u8]) -> io::Result<()> {
+    let mut line = line.lock().map_err(|_| io::Error::other("another thread failed"))?;
+    line.write_all(bytes)
+}
+
 fn is_timeout(error: &io::Error) -> bool {
     matches!(error.kind(), io::ErrorKind::WouldBlock | io::ErrorKind::TimedOut | io::ErrorKind::Interrupted)
 }
@@ -341,7 +391,7 @@ mod tests {
 
     #[test]
     fn a_missing_image_is_an_error_that_says_how_to_build_it() {
-        let error = Emulation::new("no-such-image").run(|| None, |_| ControlFlow::Continue(())).unwrap_err();
+        let error = Emulation::new("no-such-image").run(|| None, |_, _| ControlFlow::Continue(())).unwrap_err();
         assert!(error.to_string().contains("cargo firmware"));
     }
 }

@@ -18,6 +18,7 @@
 use std::collections::VecDeque;
 
 use toposlam::drive::{Goal, Suggestion};
+use toposlam::place::Place;
 use toposlam::reference::{ROBOT, ReferenceRobot, SONARS};
 use toposlam::ring::RingFrame;
 use toposlam::robot::{Board, KeepError, Seen};
@@ -25,6 +26,7 @@ use toposlam::wire::{Encoder, MAX_FRAME_BYTES, QueueFull, Request};
 use toposlam::{FaultCounters, FaultKind};
 
 use crate::evaluation::score::MapScore;
+use crate::injector::{FaultRates, LineInjector, RingInjector};
 use crate::mapping::{Step, score_path};
 use crate::world::{BodyModel, Journal, Plan, RobotModel, Rover, VoronoiError};
 
@@ -88,10 +90,14 @@ pub struct Exploration<'buffer> {
     encoder: Encoder,
     requests: u16,
     ring_faults: FaultCounters,
+    /// What changes the frames and the received bytes, when faults are wanted.
+    injectors: Option<(RingInjector, LineInjector)>,
     journal: Journal,
     nodes: Vec<Option<usize>>,
     steps: Vec<Step>,
     frames: u64,
+    /// Frames while the robot paused: its detector does not number them.
+    frames_not_taken: u32,
 }
 
 impl<'buffer> Exploration<'buffer> {
@@ -114,11 +120,18 @@ impl<'buffer> Exploration<'buffer> {
             encoder: Encoder::new(0),
             requests: 0,
             ring_faults: FaultCounters::new(),
+            injectors: None,
             journal,
             nodes: Vec::new(),
             steps: Vec::new(),
             frames: 0,
+            frames_not_taken: 0,
         })
+    }
+
+    /// Lets faults happen in [`Exploration::advance`] from now on.
+    pub fn set_faults(&mut self, rates: FaultRates, seed: u64) {
+        self.injectors = Some((RingInjector::new(rates, seed), LineInjector::new(rates, seed)));
     }
 
     /// The world's next frame. [`Exploration::map`] is to follow.
@@ -133,13 +146,20 @@ impl<'buffer> Exploration<'buffer> {
         self.board.now_ms = self.board.now_ms.wrapping_add(FRAME_MS);
         self.frames += 1;
         let seen = self.robot.turn(frame, &self.ring_faults, &mut self.board);
+        self.frames_not_taken += u32::from(self.robot.is_paused());
         if let Some((place, update)) = &seen {
-            self.nodes.push(self.journal.detect(place).node);
+            let frame_index = place.frame_index.saturating_add(self.frames_not_taken);
+            self.note(&Place { frame_index, ..*place });
             let map = self.robot.mapper().map();
             let (vertices, edges) = (map.vertices(), map.edges().count());
             self.steps.push(Step { place: *place, update: *update, vertices, edges });
         }
         seen
+    }
+
+    /// Notes a place that another robot in this world has found, in the world's frame with that number.
+    pub fn note(&mut self, place: &Place) {
+        self.nodes.push(self.journal.detect(place).node);
     }
 
     /// Drives on as far as until the next frame.
@@ -149,7 +169,13 @@ impl<'buffer> Exploration<'buffer> {
 
     /// All of it: a frame, a turn of the robot's main loop, and the way to the next frame.
     pub fn advance(&mut self) -> Seen {
-        let frame = self.frame();
+        let mut frame = self.frame();
+        if let Some((ring, line)) = &mut self.injectors {
+            frame = ring.disturb(frame, &mut self.ring_faults);
+            let sent = Vec::from(std::mem::take(&mut self.board.received));
+            self.board.received.extend(line.carry(&sent));
+            self.board.received.extend(line.noise());
+        }
         let seen = self.map(&frame);
         self.drive(self.board.suggestion);
         self.board.sent.clear();

@@ -4,7 +4,8 @@
 //! [`world`] stands in for a building and a robot with a ring of sonars, [`recording`] for a real one; both yield the
 //! ring frames that [`mapping`] turns into a map on this computer; [`nearness`] says how near to the Voronoi graph a recorded robot
 //! drove, and [`laps`] compares the laps of a round. [`exploration`] is a whole robot that drives through such a building by its
-//! own code. [`emulator`] runs the firmware with such frames, and
+//! own code, [`injector`] makes the faults that it meets, and [`soak`] lets it live with them for a day. [`emulator`] runs the
+//! firmware with such frames, and
 //! [`chip`] answers for the chips on its sensor bus; [`client`] tells a robot on a [`mod@line`] what to do. [`picture`] draws a map over its floor plan, and [`evaluation`]
 //! measures how often maps are right.
 
@@ -13,10 +14,12 @@ pub mod client;
 pub mod emulator;
 pub mod evaluation;
 pub mod exploration;
+pub mod injector;
 pub mod laps;
 pub mod line;
 pub mod mapping;
 pub mod nearness;
 pub mod picture;
 pub mod recording;
+pub mod soak;
 pub mod world;

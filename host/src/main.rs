@@ -20,6 +20,8 @@ enum Task {
     Explore(command::explore::Arguments),
     /// Do the same as `simulate` with the firmware in an emulated STM32F405, and compare the maps bit for bit.
     Emulate(command::emulate::Arguments),
+    /// Let a simulated robot live for hours with faults and an operator, and hold what it counts to what was done to it.
+    Soak(command::soak::Arguments),
     /// Map a recording of ring ranges.
     Replay(command::replay::Arguments),
     /// Measure how often the maps of many random paths are right.
@@ -33,6 +35,7 @@ fn main() -> anyhow::Result<()> {
         Task::Simulate(arguments) => command::simulate::run(&arguments),
         Task::Explore(arguments) => command::explore::run(&arguments),
         Task::Emulate(arguments) => command::emulate::run(&arguments),
+        Task::Soak(arguments) => command::soak::run(&arguments),
         Task::Replay(arguments) => command::replay::run(&arguments),
         Task::Evaluate(arguments) => command::evaluate::run(&arguments),
         Task::Command(arguments) => command::console::run(&arguments),

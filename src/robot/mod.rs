@@ -290,6 +290,11 @@ impl<'buffer, const SONARS: usize, const N: usize, const V: usize, const HISTORY
         faults
     }
 
+    /// Whether the robot was told to pause: it then takes no ring frames.
+    pub const fn is_paused(&self) -> bool {
+        self.paused
+    }
+
     /// All stages up to the map.
     pub const fn mapper(&self) -> &Mapper<SONARS, V, RobustFilter<N, V, HISTORY>> {
         &self.mapper

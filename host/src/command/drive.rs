@@ -36,6 +36,11 @@ pub(super) fn noise_factor(text: &str) -> Result<f64, String> {
     if (0.0..=100.0).contains(&factor) { Ok(factor) } else { Err("must be 0 to 100".to_owned()) }
 }
 
+pub(super) fn fault_rate(text: &str) -> Result<f64, String> {
+    let rate = text.parse().map_err(|error| format!("{error}"))?;
+    if (0.0..=1.0).contains(&rate) { Ok(rate) } else { Err("must be 0 to 1".to_owned()) }
+}
+
 impl DriveArguments {
     /// The floor plan, and the robot with its noise.
     pub(super) fn world(&self) -> anyhow::Result<(Plan, RobotModel)> {

@@ -15,8 +15,10 @@ use toposlam::reference::SNAPSHOT_BYTES;
 use toposlam::wire::{Belief, Decoder, Evidence, Location, Message, Picture, Progress, Worst};
 use toposlam_host::emulator::Emulation;
 use toposlam_host::exploration::Exploration;
+use toposlam_host::injector::FaultRates;
 
-use super::drive::{DriveArguments, Summary, progress_bar};
+use super::drive::{DriveArguments, Summary, fault_rate, progress_bar};
+use super::hardship;
 
 /// Where `cargo firmware` puts the image.
 const IMAGE: &str = "thumbv7em-none-eabihf/release/robot";
@@ -38,6 +40,10 @@ pub(crate) struct Arguments {
     /// Give up after this many seconds.
     #[arg(long, default_value_t = 800)]
     timeout_s: u64,
+    /// Faults of the sensor bus and the line, 0 to 1: the probability that a transfer is refused; the others follow
+    /// (docs/faults.md). With faults the map is held to the truth, and not to this computer's.
+    #[arg(long, default_value_t = 0.0, value_parser = fault_rate)]
+    faults: f64,
 }
 
 /// So long the world waits for the firmware to say where it drives.
@@ -50,15 +56,23 @@ struct Repetition<'buffer> {
 }
 
 /// What the firmware said.
-struct Heard {
+pub(super) struct Heard {
     decoder: Decoder,
-    picture: Picture<64>,
+    pub(super) picture: Picture<64>,
     places: Vec<(u32, u16)>,
 }
 
 impl Heard {
+    pub(super) const fn new() -> Self {
+        Self { decoder: Decoder::new(), picture: Picture::new(), places: Vec::new() }
+    }
+
     /// Takes bytes of the line, and hands on every message.
-    fn feed(&mut self, bytes: &[u8], mut on_message: impl FnMut(Message) -> ControlFlow<()>) -> ControlFlow<()> {
+    pub(super) fn feed(
+        &mut self,
+        bytes: &[u8],
+        mut on_message: impl FnMut(Message) -> ControlFlow<()>,
+    ) -> ControlFlow<()> {
         let mut rest = bytes;
         loop {
             rest = match self.decoder.feed(rest) {
@@ -82,6 +96,12 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
         Some(elf) => elf.clone(),
         None => build_firmware()?,
     };
+    let mut emulation = Emulation::new(elf);
+    emulation.qemu = arguments.qemu.clone();
+    emulation.timeout = Duration::from_secs(arguments.timeout_s);
+    if arguments.faults > 0.0 {
+        return hardship::run(&arguments.drive, emulation, arguments.places, FaultRates::scaled(arguments.faults));
+    }
     let (plan, model) = arguments.drive.world()?;
     let mut buffer = [0; SNAPSHOT_BYTES];
     // The emulator asks for frames on one thread and hands on what it heard on another.
@@ -91,14 +111,11 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     });
     let (tell_suggestion, suggestions) = mpsc::channel::<Suggestion>();
     let progress = progress_bar(arguments.places)?;
-    let mut heard = Heard { decoder: Decoder::new(), picture: Picture::new(), places: Vec::new() };
+    let mut heard = Heard::new();
     let mut elsewhere = None;
     let mut frames = 0;
     let (repeated, bar) = (&repetition, &progress);
 
-    let mut emulation = Emulation::new(elf);
-    emulation.qemu = arguments.qemu.clone();
-    emulation.timeout = Duration::from_secs(arguments.timeout_s);
     let outcome = emulation.run(
         move || {
             if frames > 0 {
@@ -122,7 +139,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
             repetition.suggestions.push(suggestion);
             Some(frame)
         },
-        |bytes| {
+        |bytes, _| {
             heard.feed(bytes, |message| {
                 let Ok(repetition) = repetition.lock() else { return ControlFlow::Break(()) };
                 let is_same = match message {

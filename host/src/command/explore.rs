@@ -8,9 +8,10 @@ use toposlam::drive::Journey;
 use toposlam::reference::SNAPSHOT_BYTES;
 use toposlam::wire::Command;
 use toposlam_host::exploration::Exploration;
+use toposlam_host::injector::FaultRates;
 use toposlam_host::world::{Plan, Report, RobotModel};
 
-use super::drive::{load_plan, noise_factor};
+use super::drive::{fault_rate, load_plan, noise_factor};
 
 /// A journey that takes more ring frames is given up.
 const FRAMES_PER_JOURNEY: u64 = 20_000;
@@ -42,6 +43,9 @@ pub(crate) struct Arguments {
     /// How far off its normal a wall is still heard, in degrees.
     #[arg(long)]
     specular_limit_deg: Option<f64>,
+    /// Faults of the ring and the line, 0 to 1: the probability that a sonar's answer is lost; the others follow (docs/faults.md).
+    #[arg(long, default_value_t = 0.0, value_parser = fault_rate)]
+    faults: f64,
 }
 
 /// What one run came to.
@@ -94,6 +98,9 @@ fn one(arguments: &Arguments, plan: &Plan, noise: f64, seed: u64) -> anyhow::Res
     }
     let mut buffer = [0; SNAPSHOT_BYTES];
     let mut exploration = Exploration::start(plan, model, seed, &mut buffer)?;
+    if arguments.faults > 0.0 {
+        exploration.set_faults(FaultRates::scaled(arguments.faults), seed);
+    }
     let most_frames = arguments.places as u64 * 2000;
     while exploration.places() < arguments.places && exploration.frames() < most_frames {
         exploration.advance();

@@ -1,5 +1,5 @@
 //! The subcommands, a file each: its arguments and what it does with them. `drive` is what two of them share,
-//! `filter` what three of them let choose.
+//! `filter` what three of them let choose, `hardship` what `emulate` does with faults.
 
 pub(crate) mod console;
 mod drive;
@@ -7,6 +7,8 @@ pub(crate) mod emulate;
 pub(crate) mod evaluate;
 pub(crate) mod explore;
 mod filter;
+mod hardship;
 mod rails;
 pub(crate) mod replay;
 pub(crate) mod simulate;
+pub(crate) mod soak;

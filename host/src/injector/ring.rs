@@ -1,0 +1,126 @@
+//! Faults of the ring of sonars, as its driver hands them on.
+
+use std::fmt;
+
+use toposlam::reference::SONARS;
+use toposlam::ring::{Echo, RingFrame};
+use toposlam::{FaultCounters, FaultKind};
+
+use super::{Chance, FaultRates};
+
+/// A corrupted range is any up to this one, in millimetres.
+const RANGE_MAX_MM: u32 = 6000;
+
+/// What an injector did to ring frames.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct RingCounts {
+    /// Answers that were lost.
+    pub lost_answers: u64,
+    /// Ranges that were replaced by another one.
+    pub corrupted_ranges: u64,
+    /// Frames that came again in the place of another.
+    pub delayed_frames: u64,
+    /// How often the bus got stuck.
+    pub stuck_times: u64,
+    /// The frames without any sonar that this cost.
+    pub stuck_frames: u64,
+}
+
+impl fmt::Display for RingCounts {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(
+            f,
+            "{} answers lost, {} ranges corrupted, {} frames delayed, bus stuck {} times for {} frames",
+            self.lost_answers, self.corrupted_ranges, self.delayed_frames, self.stuck_times, self.stuck_frames
+        )
+    }
+}
+
+/// Changes the frames between a world and a robot.
+#[derive(Clone, Debug)]
+pub struct RingInjector {
+    rates: FaultRates,
+    chance: Chance,
+    /// The last frame that the sonars heard and the robot got.
+    before: Option<RingFrame<SONARS>>,
+    stuck_frames_left: u32,
+    counts: RingCounts,
+}
+
+impl RingInjector {
+    /// One for a world.
+    pub fn new(rates: FaultRates, seed: u64) -> Self {
+        Self { rates, chance: Chance::new(seed, 0), before: None, stuck_frames_left: 0, counts: RingCounts::default() }
+    }
+
+    /// What the robot gets of a frame. `driver` are the faults that the ring's driver counts: a lost answer as `SonarSilent`, each
+    /// sonar on a stuck bus as `BusError`.
+    pub fn disturb(&mut self, frame: RingFrame<SONARS>, driver: &mut FaultCounters) -> RingFrame<SONARS> {
+        if self.stuck_frames_left == 0 && self.chance.happens(self.rates.bus_stuck) {
+            self.stuck_frames_left = self.chance.within(1, FaultRates::STUCK_FRAMES);
+            self.counts.stuck_times += 1;
+        }
+        if self.stuck_frames_left > 0 {
+            self.stuck_frames_left -= 1;
+            self.counts.stuck_frames += 1;
+            (0..SONARS).for_each(|_| driver.count(FaultKind::BusError));
+            return RingFrame { echoes: [Echo::Dead; SONARS] };
+        }
+        let mut frame = match self.before {
+            Some(before) if self.chance.happens(self.rates.frame_delayed) => {
+                self.counts.delayed_frames += 1;
+                before
+            }
+            _ => frame,
+        };
+        self.before = Some(frame);
+        for echo in &mut frame.echoes {
+            if self.chance.happens(self.rates.answer_lost) {
+                self.counts.lost_answers += 1;
+                driver.count(FaultKind::SonarSilent);
+                *echo = Echo::Dead;
+            } else if self.chance.happens(self.rates.range_corrupted) {
+                self.counts.corrupted_ranges += 1;
+                *echo = Echo::Range { range_mm: self.chance.within(0, RANGE_MAX_MM) as u16 };
+            }
+        }
+        frame
+    }
+
+    /// What was done so far.
+    pub const fn counts(&self) -> RingCounts {
+        self.counts
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn frames(rates: FaultRates, seed: u64) -> (Vec<RingFrame<SONARS>>, RingCounts, FaultCounters) {
+        let mut injector = RingInjector::new(rates, seed);
+        let mut driver = FaultCounters::new();
+        let world = (0..1000).map(|number| RingFrame { echoes: [Echo::Range { range_mm: 500 + number }; SONARS] });
+        let got = world.map(|frame| injector.disturb(frame, &mut driver)).collect();
+        (got, injector.counts(), driver)
+    }
+
+    #[test]
+    fn the_same_seed_gives_the_same_faults_and_another_seed_others() {
+        let rates = FaultRates::scaled(0.1);
+        assert_eq!(frames(rates, 1).0, frames(rates, 1).0);
+        assert_ne!(frames(rates, 1).0, frames(rates, 2).0);
+    }
+
+    #[test]
+    fn what_is_counted_is_what_the_frames_show() {
+        let (got, counts, driver) = frames(FaultRates::scaled(0.05), 3);
+        let blind = got.iter().filter(|frame| frame.dead_sensors().count() == SONARS).count() as u64;
+        let dead: usize = got.iter().map(|frame| frame.dead_sensors().count()).sum();
+        assert!(counts.stuck_frames > 0 && counts.delayed_frames > 0 && counts.corrupted_ranges > 0);
+        assert_eq!(blind, counts.stuck_frames);
+        assert_eq!(dead as u64, counts.lost_answers + SONARS as u64 * counts.stuck_frames);
+        assert_eq!(u64::from(driver.of(FaultKind::SonarSilent)), counts.lost_answers);
+        assert_eq!(u64::from(driver.of(FaultKind::BusError)), SONARS as u64 * counts.stuck_frames);
+    }
+}
