@@ -83,7 +83,7 @@ impl<const HISTORY: usize> Departures<HISTORY> {
 
     #[cfg(feature = "snapshot")]
     pub(super) fn restore(&mut self, mut section: Reader<'_>) -> Result<(), SnapshotError> {
-        Self::check(section.clone())?;
+        Self::check(section)?;
         self.clear();
         for _ in 0..section.u16()? {
             let note = section.u8()?;

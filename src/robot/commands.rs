@@ -18,7 +18,7 @@ impl<const SONARS: usize, const N: usize, const V: usize, const HISTORY: usize> 
             self.inbox.take(byte);
         }
         // The command needs the robot, and the robot holds the inbox.
-        let mut inbox = core::mem::replace(&mut self.inbox, Inbox::new());
+        let mut inbox = core::mem::take(&mut self.inbox);
         let reply = inbox.turn(|command| self.execute(command, board).unwrap_or_else(Outcome::Refused));
         self.inbox = inbox;
         if let Some(reply) = reply {

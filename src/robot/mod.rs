@@ -354,7 +354,7 @@ fn restore<const SONARS: usize, const N: usize, const V: usize, const HISTORY: u
     resume: Resume,
 ) -> Result<(), SnapshotError> {
     let section = Snapshot::open(bytes)?.section(DRIVE_SECTION);
-    if let Some(section) = section.clone() {
+    if let Some(section) = section {
         Drive::<V, HISTORY>::check(section)?;
     }
     mapper.restore(bytes, resume)?;

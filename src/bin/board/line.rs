@@ -27,8 +27,9 @@ static RECEIVED: Mutex<RefCell<Deque<u8, RECEIVE_BYTES>>> = Mutex::new(RefCell::
 #[interrupt]
 fn USART1() {
     free(|section| {
-        let mut receiver = RECEIVER.borrow(section).borrow_mut();
-        let mut received = RECEIVED.borrow(section).borrow_mut();
+        // Both are borrowed in critical sections only, so they are free.
+        let Ok(mut receiver) = RECEIVER.borrow(section).try_borrow_mut() else { return };
+        let Ok(mut received) = RECEIVED.borrow(section).try_borrow_mut() else { return };
         let Some(receiver) = receiver.as_mut() else { return };
         loop {
             match serial::Read::read(receiver) {
@@ -54,7 +55,11 @@ impl Line {
     pub(crate) fn open(line: Serial<pac::USART1>, queue: &'static mut TransmitQueue) -> Self {
         let (transmitter, mut receiver) = line.split();
         receiver.listen();
-        free(|section| RECEIVER.borrow(section).replace(Some(receiver)));
+        free(|section| {
+            if let Ok(mut slot) = RECEIVER.borrow(section).try_borrow_mut() {
+                *slot = Some(receiver);
+            }
+        });
         // SAFETY: the handler is prepared, and it shares nothing but what is behind the mutexes.
         #[allow(unsafe_code)]
         unsafe {
@@ -67,7 +72,7 @@ impl Line {
 
     /// A byte that came in.
     pub(crate) fn receive() -> Option<u8> {
-        free(|section| RECEIVED.borrow(section).borrow_mut().pop_front())
+        free(|section| RECEIVED.borrow(section).try_borrow_mut().ok()?.pop_front())
     }
 
     /// Queues a frame whole, or not at all.
