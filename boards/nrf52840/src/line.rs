@@ -57,10 +57,14 @@ impl End {
     }
 }
 
+/// With interrupts off nobody else has it, so this is never `None`.
+fn with_end<OUTCOME>(work: impl FnOnce(&mut End) -> OUTCOME) -> Option<OUTCOME> {
+    free(|section| END.borrow(section).try_borrow_mut().ok().map(|mut end| work(&mut end)))
+}
+
 #[interrupt]
 fn UARTE0_UART0() {
-    free(|section| {
-        let mut end = END.borrow(section).borrow_mut();
+    with_end(|end| {
         end.take();
         end.pump();
     });
@@ -83,8 +87,7 @@ impl Line {
         uart.enable.write(|w| w.enable().enabled());
         uart.tasks_startrx.write(|w| w.tasks_startrx().set_bit());
         uart.tasks_starttx.write(|w| w.tasks_starttx().set_bit());
-        free(|section| {
-            let mut end = END.borrow(section).borrow_mut();
+        with_end(|end| {
             end.uart = Some(uart);
             // One zero, so that noise from the start does not spoil the first frame.
             let _ = end.to_send.push_back(0);
@@ -100,13 +103,12 @@ impl Line {
 
     /// A byte that came in.
     pub(crate) fn receive(&mut self) -> Option<u8> {
-        free(|section| END.borrow(section).borrow_mut().received.pop_front())
+        with_end(|end| end.received.pop_front()).flatten()
     }
 
     /// Queues a frame whole, or not at all.
     pub(crate) fn send(&mut self, frame: &[u8]) -> Result<(), QueueFull> {
-        free(|section| {
-            let mut end = END.borrow(section).borrow_mut();
+        with_end(|end| {
             if end.to_send.capacity() - end.to_send.len() < frame.len() {
                 return Err(QueueFull);
             }
@@ -117,5 +119,6 @@ impl Line {
             end.pump();
             Ok(())
         })
+        .unwrap_or(Err(QueueFull))
     }
 }

@@ -112,6 +112,8 @@ fn main() -> ! {
     let bus = Bus::open(device.TWIM0, pins);
 
     let pwm = Pwm::new(device.PWM0);
+    // Its pins are chosen while it is off; the first duty switches it on.
+    pwm.disable();
     pwm.set_period(20_000_u32.hz());
     pwm.set_output_pin(Channel::C0, port_1.p1_11.into_push_pull_output(Level::Low).degrade());
     pwm.set_output_pin(Channel::C1, port_1.p1_12.into_push_pull_output(Level::Low).degrade());
