@@ -156,7 +156,7 @@ impl<const WRITE: usize, const ERASE: usize> FlashModel<WRITE, ERASE> {
     fn check(&self, from: u32, length: usize, unit: usize) -> Result<usize, FlashFault> {
         let from = from as usize;
         match () {
-            () if from % unit != 0 || length % unit != 0 => Err(FlashFault::NotAligned),
+            () if !from.is_multiple_of(unit) || !length.is_multiple_of(unit) => Err(FlashFault::NotAligned),
             () if from + length > self.bytes.len() => Err(FlashFault::OutOfBounds),
             () => Ok(from),
         }

@@ -106,7 +106,7 @@ mod tests {
         let mut line = LineInjector::new(FaultRates::NONE, 1);
         let sent: Vec<u8> = (0..=255).collect();
         assert_eq!(line.carry(&sent), sent);
-        assert_eq!(line.noise(), []);
+        assert!(line.noise().is_empty());
         assert_eq!(line.counts(), LineCounts::default());
     }
 
