@@ -31,8 +31,11 @@ const RAM_BYTES: usize = 128 * 1024;
 const STACK_PAINT: [u8; 4] = 0xCCCC_CCCC_u32.to_le_bytes();
 const BUFFER_BYTES: usize = 4096;
 /// The firmware waits for a byte that was lost until it has been woken so many times; the clock alone takes 20 s for that. With
-/// faults, a zero on USART1 wakes it whenever the line to the bridge was quiet for this long: between frames zeros mean nothing.
+/// faults, zeros on USART1 wake it whenever the line to the bridge was quiet for this long: between frames zeros mean nothing.
 const WAKE_AFTER: Duration = Duration::from_millis(1);
+/// Computers do not wait for less than some four milliseconds; so many zeros each time bring a lost byte down to a quarter of a
+/// second.
+const WAKE: [u8; 4] = [0; 4];
 
 /// What to run and for how long.
 #[derive(Clone, Debug)]
@@ -155,7 +158,7 @@ impl Emulation {
                 Ok(count) => count,
                 Err(error) if is_timeout(&error) => {
                     if bridge.devices().frames() > 0 {
-                        send(to_firmware, &[0])?;
+                        send(to_firmware, &WAKE)?;
                     }
                     continue;
                 }

@@ -71,7 +71,8 @@ impl<const V: usize, const HISTORY: usize> Drive<V, HISTORY> {
         Ok(())
     }
 
-    /// Takes what the detector and the filter made of a ring frame, and says where to go.
+    /// Takes what the detector and the filter made of a ring frame, and says where to go. With too few live sensors the robot
+    /// stands until it hears again.
     ///
     /// `seen` is what the mapper said of the frame.
     #[inline(never)]
@@ -84,6 +85,9 @@ impl<const V: usize, const HISTORY: usize> Drive<V, HISTORY> {
         if let Some((place, update)) = seen {
             self.navigator.arrive(filter, update);
             self.pilot.arrive(place.degree);
+        }
+        if detector.is_blind() {
+            return Suggestion::STAND;
         }
         let navigator = &mut self.navigator;
         self.pilot.advance(&detector.scan(), detector.is_leaving(), |ways| navigator.choose(filter, ways))

@@ -160,8 +160,7 @@ impl<const SONARS: usize> PlaceDetector<SONARS> {
         let frame_index = self.frame_index;
         self.frame_index = self.frame_index.saturating_add(1);
         self.smooth_mm = self.smooth(frame);
-        let live = self.smooth_mm.iter().filter(|range_mm| **range_mm != DEAD).count();
-        if live < usize::from(self.config.live_sensors_min) {
+        if self.is_blind() {
             self.faults.count(FaultKind::RingBlind);
             return None;
         }
@@ -177,6 +176,12 @@ impl<const SONARS: usize> PlaceDetector<SONARS> {
             separation_mrad: self.config.separation_mrad,
             equidistance_mm: self.config.equidistance_mm,
         }
+    }
+
+    /// Whether too few sensors of the newest frame live to look for a place, or to drive by.
+    pub(crate) fn is_blind(&self) -> bool {
+        let live = self.smooth_mm.iter().filter(|range_mm| **range_mm != DEAD).count();
+        live < usize::from(self.config.live_sensors_min)
     }
 
     /// Whether the robot is still at the place that was reported last.

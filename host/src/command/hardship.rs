@@ -138,14 +138,12 @@ pub(super) fn run(
     for kind in FaultKind::ALL.into_iter().filter(|kind| heard.picture.fault(*kind) > 0) {
         println!("firmware's fault {kind:?}: {}", heard.picture.fault(kind));
     }
-    let Some(health) = heard.picture.health() else { bail!("the firmware never said how it is doing") };
     println!("sensor bus: {}", outcome.bridge);
     println!("line to the firmware: {}", line.counts());
     println!(
-        "firmware: {} places in {} frames, {} rounds of the loop, {:.1} s",
+        "firmware: {} places in {} frames, {turns} rounds of the loop, {:.1} s",
         exploration.places(),
         outcome.frames,
-        health.loop_count,
         outcome.seconds
     );
     if let Some(bytes) = outcome.stack_high_water_bytes {

@@ -2,12 +2,17 @@
 
 use std::fmt;
 
-use toposlam::wire::{Command, Encoder, MAX_FRAME_BYTES, Request};
+use toposlam::wire::{Command, Encoder, Inbox, MAX_FRAME_BYTES, Request};
 
 use super::{Chance, FaultRates};
 
 /// Requests of a flood have numbers from this on.
 const FIRST_FLOOD_ID: u16 = 0x8000;
+
+const _: () = assert!(
+    LineInjector::BURST_BYTES > Inbox::BYTES_PER_TURN as u32,
+    "a burst can be more than a robot looks at in a turn"
+);
 
 /// What an injector did to a line.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]

@@ -67,7 +67,7 @@ pub struct Account {
     pub command_flood: u64,
     /// Requests that the robot's replies refuse.
     pub command_refused: u64,
-    /// Places beyond the room of the history.
+    /// Places beyond the room of the history; the filter counts its faults from the last restored snapshot on.
     pub history_full: u64,
 }
 
@@ -147,7 +147,7 @@ impl Soak {
                 out_of_order += u64::from(u64::from(update.place_index) != places);
             }
             let sent = mem::take(&mut exploration.board().sent);
-            auditor.depart(&sent, &operator);
+            auditor.depart(&sent, &operator, exploration.places() as u64);
             auditor.map(&frame);
             each(&mut heard, &lines[1].carry(&sent), |message| {
                 if let Message::Reply(reply) = message {
@@ -161,11 +161,11 @@ impl Soak {
         let places = exploration.places() as u64;
         let observed = u64::from(exploration.robot().mapper().filter().observed());
         let driver = *exploration.ring_faults();
-        let history = toposlam::reference::HISTORY as u64;
+        let counted_from = auditor.restored_at.max(toposlam::reference::HISTORY as u64);
         let account = Account {
             sonar_silent: driver.of(FaultKind::SonarSilent).into(),
             bus_error: driver.of(FaultKind::BusError).into(),
-            history_full: places.saturating_sub(history),
+            history_full: places.saturating_sub(counted_from),
             ..auditor.account
         };
         Ok(Life {
@@ -196,6 +196,8 @@ struct Auditor {
     /// The number of the request that was answered last.
     replied: Option<u16>,
     is_paused: bool,
+    /// How many places there were when a snapshot was restored the last time.
+    restored_at: u64,
 }
 
 impl Auditor {
@@ -221,16 +223,18 @@ impl Auditor {
         }
     }
 
-    /// What the robot said in its turn.
-    fn depart(&mut self, bytes: &[u8], operator: &Operator) {
-        let Self { account, departing, replied, is_paused, .. } = self;
+    /// What the robot said in its turn, after so many places.
+    fn depart(&mut self, bytes: &[u8], operator: &Operator, places: u64) {
+        let Self { account, departing, replied, is_paused, restored_at, .. } = self;
         each(departing, bytes, |message| {
             let Message::Reply(reply) = message else { return };
             // A request that came again is answered again, and not executed.
             let is_executed = replied.replace(reply.request) != Some(reply.request);
             account.command_refused += u64::from(is_executed && matches!(reply.outcome, Outcome::Refused(_)));
-            if let Some(Command::Pause { on }) = operator.awaits(reply.request) {
-                *is_paused = on;
+            match operator.awaits(reply.request) {
+                Some(Command::Pause { on }) => *is_paused = on,
+                Some(Command::RestoreCommit) => *restored_at = places,
+                _ => {}
             }
         });
     }
