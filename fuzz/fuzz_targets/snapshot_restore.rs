@@ -5,29 +5,24 @@ use std::sync::LazyLock;
 
 use arbitrary::Arbitrary;
 use libfuzzer_sys::fuzz_target;
-use toposlam::Observation;
 use toposlam::snapshot::{FILTER_SECTION, SNAPSHOT_VERSION, SnapshotError, Writer};
 use toposlam::wire::crc32;
 use toposlam_fuzz::filters::{self, Seen, Small};
 
-/// How many places are observed behind a restore.
-const PLACES: usize = 30;
-/// Behind how many of them the filter only localises, or maps again.
-const SWITCH_AT: usize = 20;
-/// For how many of them a second filter, restored from the first one, is held to it.
-const WITH_TWIN: usize = 8;
+/// How much happens behind a restore at most, before the last place.
+const STEPS: usize = 30;
 
 #[derive(Arbitrary, Debug)]
 struct Input<'a> {
-    /// What the robot sees behind the restore, over and over.
-    seen: Vec<Seen>,
     source: Source<'a>,
+    /// What happens behind the restore.
+    then: Vec<Then>,
 }
 
 #[derive(Arbitrary, Debug)]
 enum Source<'a> {
     /// A true snapshot's contents, changed; the checksum is right.
-    Changed { which: u8, edits: Vec<Edit<'a>> },
+    Changed { which: u8, edits: Edits<'a> },
     /// The contents of the filter's section.
     Contents(&'a [u8]),
     /// All sections; header and checksum are right.
@@ -35,16 +30,50 @@ enum Source<'a> {
     /// The whole.
     Whole(&'a [u8]),
     /// A true snapshot whose checksum does not follow the changes.
-    Damaged { which: u8, edits: Vec<Edit<'a>> },
+    Damaged { which: u8, edits: Edits<'a> },
+}
+
+#[derive(Arbitrary, Clone, Copy, Debug)]
+enum Then {
+    Place(Seen),
+    Polish,
+    LocaliseOnly(bool),
+}
+
+/// One change at least: a snapshot without any takes longest and shows least.
+#[derive(Arbitrary, Debug)]
+struct Edits<'a> {
+    first: Edit<'a>,
+    more: Vec<Edit<'a>>,
 }
 
 #[derive(Arbitrary, Debug)]
 enum Edit<'a> {
-    Set { at: u16, byte: u8 },
-    Add { at: u16, what: i8 },
-    Insert { at: u16, bytes: &'a [u8] },
-    Remove { at: u16, count: u8 },
-    Cut { to: u16 },
+    Set {
+        at: u16,
+        byte: u8,
+    },
+    Add {
+        at: u16,
+        what: i8,
+    },
+    /// Half a byte: a path has two places in one.
+    Xor {
+        at: u16,
+        half: bool,
+        with: u8,
+    },
+    Insert {
+        at: u16,
+        bytes: &'a [u8],
+    },
+    Remove {
+        at: u16,
+        count: u8,
+    },
+    Cut {
+        to: u16,
+    },
 }
 
 /// True snapshots: of filters that saw nothing, little, more than they remember, that know a map, and that only localise.
@@ -80,7 +109,7 @@ fuzz_target!(|input: Input<'_>| {
         assert_eq!(filters::saved(&mut filter), filters::saved(&mut twin), "nor what comes later");
         return;
     }
-    goes_on(&mut filter, &input.seen);
+    goes_on(&mut filter, &input.then);
 });
 
 /// The snapshot that is restored.
@@ -113,15 +142,19 @@ fn of_contents(contents: &[u8]) -> Vec<u8> {
     snapshot
 }
 
-fn edited(bytes: &[u8], edits: &[Edit<'_>]) -> Vec<u8> {
+fn edited(bytes: &[u8], edits: &Edits<'_>) -> Vec<u8> {
     let mut bytes = bytes.to_vec();
-    for edit in edits {
+    for edit in std::iter::once(&edits.first).chain(&edits.more) {
         let length = bytes.len();
         let within = |at: u16| usize::from(at) % length.max(1);
         match *edit {
             Edit::Set { at, byte } => bytes.iter_mut().skip(within(at)).take(1).for_each(|slot| *slot = byte),
             Edit::Add { at, what } => {
                 bytes.iter_mut().skip(within(at)).take(1).for_each(|slot| *slot = slot.wrapping_add_signed(what));
+            }
+            Edit::Xor { at, half, with } => {
+                let with = (with & 15) << if half { 4 } else { 0 };
+                bytes.iter_mut().skip(within(at)).take(1).for_each(|slot| *slot ^= with);
             }
             Edit::Insert { at, bytes: more } => _ = bytes.splice(within(at)..within(at), more.iter().copied()),
             Edit::Remove { at, count } => {
@@ -134,29 +167,29 @@ fn edited(bytes: &[u8], edits: &[Edit<'_>]) -> Vec<u8> {
 }
 
 /// Whatever a snapshot said, the filter is one that can go on.
-fn goes_on(filter: &mut Small, seen: &[Seen]) {
+fn goes_on(filter: &mut Small, then: &[Then]) {
+    filters::check_map(filter);
     let mut twin = again(filter);
     // Up to 255 moves at a place are allowed, and would be all that is fuzzed.
-    let places = (4 * PLACES / (4 + usize::from(filters::moves(filter)))).max(1);
-    let mut seen = seen.iter().copied().map(Seen::observation).cycle();
-    for index in 0..places {
-        let observation: Observation = seen.next().unwrap_or_else(|| filters::walk(index));
-        let update = filter.observe(observation);
-        filters::check(filter, &update);
-        if index < WITH_TWIN {
-            assert_eq!(twin.observe(observation), update, "the restored filter does as the saved one does");
-        }
-        if index % 4 == 1 {
-            filter.polish();
-            twin.polish();
-        }
-        if index + 1 == WITH_TWIN {
-            assert_eq!(filters::saved(filter), filters::saved(&mut twin));
-        }
-        if index + 1 == SWITCH_AT {
-            filter.set_localise_only(observation.degree.is_some());
+    let steps = 4 * STEPS / (4 + usize::from(filters::moves(filter)));
+    for then in then.iter().take(steps).chain([&Then::Place(Seen::PLAIN)]) {
+        match *then {
+            Then::Place(seen) => {
+                let update = filter.observe(seen.observation());
+                filters::check(filter, &update);
+                assert_eq!(twin.observe(seen.observation()), update, "the restored filter does as the saved one does");
+            }
+            Then::Polish => {
+                filter.polish();
+                twin.polish();
+            }
+            Then::LocaliseOnly(on) => {
+                filter.set_localise_only(on);
+                twin.set_localise_only(on);
+            }
         }
     }
+    assert_eq!(filters::saved(filter), filters::saved(&mut twin));
     again(filter);
 }
 

@@ -25,6 +25,9 @@ pub struct Seen {
 }
 
 impl Seen {
+    /// A place without hints.
+    pub const PLAIN: Self = Self { steps: 600, hints: 3 };
+
     /// The same as an observation.
     pub fn observation(self) -> Observation {
         Observation {
@@ -95,26 +98,33 @@ pub fn moves(filter: &mut Small) -> u8 {
     *contents(&snapshot).unwrap().bytes(MOVES_AT + 1).unwrap().last().unwrap()
 }
 
-/// Checks what holds of every filter behind an update.
-pub fn check(filter: &Small, update: &Update) {
+/// Checks that the map is one, and that the path leads through it.
+pub fn check_map(filter: &Small) {
     let map = filter.map();
     let vertices = map.vertices();
-    let is_vertex = |vertex: u8| vertex < vertices;
     assert!(usize::from(vertices) <= VERTICES);
     for from in 0..64 {
         let row = map.neighbours(from);
         for to in (0..64).filter(|to| row >> to & 1 == 1) {
-            assert!(is_vertex(from) && is_vertex(to), "an edge from {from} to {to} of {vertices}");
+            assert!(from < vertices && to < vertices, "an edge from {from} to {to} of {vertices}");
             assert!(map.neighbours(to) >> from & 1 == 1, "the edge from {from} to {to} does not lead back");
         }
-        assert_eq!(map.label(from).is_some(), is_vertex(from));
-        assert!(filter.renamed(from).is_none_or(is_vertex));
-        assert!(filter.place_probability_q16(from) <= 65_600);
+        assert_eq!(map.label(from).is_some(), from < vertices);
     }
-    assert!(filter.path().all(is_vertex));
-    if vertices == 0 {
+    assert!(filter.path().all(|vertex| vertex < vertices));
+}
+
+/// Checks what holds of every filter behind an update.
+pub fn check(filter: &Small, update: &Update) {
+    check_map(filter);
+    let is_vertex = |vertex: u8| vertex < filter.map().vertices();
+    if filter.map().vertices() == 0 {
         // It only localises, and has no map to do that in.
         return;
+    }
+    for vertex in 0..64 {
+        assert!(filter.renamed(vertex).is_none_or(is_vertex));
+        assert!(filter.place_probability_q16(vertex) <= 65_600);
     }
     assert_eq!(filter.path().last(), Some(update.vertex));
     assert!(filter.worst().walk().iter().copied().all(is_vertex));
