@@ -191,11 +191,7 @@ fn any_turn() -> Option<Turn> {
 }
 
 pub(crate) fn robust_filter() {
-    static FILTER: ConstStaticCell<RobustFilter<10, VERTICES, 400>> = ConstStaticCell::new(RobustFilter::new());
     static LARGE: ConstStaticCell<RobustFilter<3, 32, 32>> = ConstStaticCell::new(RobustFilter::new());
-    if let Some(filter) = FILTER.try_take() {
-        robust(filter);
-    }
     if let Some(filter) = LARGE.try_take() {
         robust(filter);
     }
@@ -264,6 +260,7 @@ pub(crate) fn mapper() {
     for _ in 0..black_box(9) {
         black_box(mapper.observe(&any_frame(), any_turn(), &FaultCounters::new().opaque(), any_answer));
     }
+    robust(mapper.filter_mut());
     mapper.hurry();
     black_box(mapper.reset(&reference::MAPPER.opaque(), any_answer).is_ok());
     black_box((mapper.map(), mapper.filter(), mapper.detector()));
