@@ -7,22 +7,22 @@ use std::{
 };
 
 use toposlam::wire::{
-    CHUNK_BYTES, Chunk, Command, Decoder, Encoder, Header, Info, MAX_FRAME_BYTES, Message, Outcome, Picture, Progress,
-    Refusal, Request, crc32,
+    CHUNK_BYTES, Chunk, Command, Encoder, Info, MAX_FRAME_BYTES, Message, Outcome, Picture, Refusal, Request, crc32,
 };
+
+use crate::listener::{Event, Listener};
 
 const BUFFER_BYTES: usize = 4096;
 
 /// A blocking client over any line. A read of the line should give up after some milliseconds when nothing comes.
 ///
 /// A request whose reply does not come in time is sent again, which the robot executes once.
-/// Every message goes to the callback, replies to other requests included.
+/// All that is heard goes to the callback, replies included.
 pub struct Client<LINE, HEARD> {
     line: LINE,
     heard: HEARD,
     encoder: Encoder,
-    decoder: Decoder,
-    picture: Picture<64>,
+    listener: Listener,
     next_id: u16,
     /// How long a reply, or the whole map, is waited for; 1 s unless set.
     pub timeout: Duration,
@@ -30,7 +30,7 @@ pub struct Client<LINE, HEARD> {
     pub attempts: u32,
 }
 
-impl<LINE: Read + Write, HEARD: FnMut(Header, &Message)> Client<LINE, HEARD> {
+impl<LINE: Read + Write, HEARD: FnMut(&Listener, Event<'_>)> Client<LINE, HEARD> {
     /// A client on a line. `first_id` should not be the number of the last request of the client before it: a random one is
     /// good.
     pub fn new(line: LINE, first_id: u16, heard: HEARD) -> Self {
@@ -38,17 +38,24 @@ impl<LINE: Read + Write, HEARD: FnMut(Header, &Message)> Client<LINE, HEARD> {
             line,
             heard,
             encoder: Encoder::default(),
-            decoder: Decoder::new(),
-            picture: Picture::new(),
+            listener: Listener::new(),
             next_id: first_id,
             timeout: Duration::from_secs(1),
             attempts: 5,
         }
     }
 
-    /// The map and the rest of what was heard so far.
-    pub fn picture(&self) -> &Picture<64> {
-        &self.picture
+    /// What was heard so far.
+    pub const fn listener(&self) -> &Listener {
+        &self.listener
+    }
+
+    /// Reads the line once and takes in what came, if anything.
+    ///
+    /// # Errors
+    /// When the line fails or ends.
+    pub fn listen(&mut self) -> Result<(), ClientError> {
+        self.await_reply(None).map(drop)
     }
 
     /// Sends a command and waits for what comes of it; a refusal is an outcome.
@@ -62,7 +69,7 @@ impl<LINE: Read + Write, HEARD: FnMut(Header, &Message)> Client<LINE, HEARD> {
             self.send(&request)?;
             let deadline = Instant::now() + self.timeout;
             while Instant::now() < deadline {
-                if let Some(outcome) = self.listen(Some(request.id))? {
+                if let Some(outcome) = self.await_reply(Some(request.id))? {
                     return Ok(outcome);
                 }
             }
@@ -101,9 +108,10 @@ impl<LINE: Read + Write, HEARD: FnMut(Header, &Message)> Client<LINE, HEARD> {
             self.order(Command::GetMap)?;
             let deadline = Instant::now() + self.timeout;
             while Instant::now() < deadline {
-                self.listen(None)?;
-                if self.picture.is_converged() && self.picture.is_complete() {
-                    return Ok(&self.picture);
+                self.listen()?;
+                let picture = self.listener.picture();
+                if picture.is_converged() && picture.is_complete() {
+                    return Ok(self.listener.picture());
                 }
             }
         }
@@ -154,7 +162,7 @@ impl<LINE: Read + Write, HEARD: FnMut(Header, &Message)> Client<LINE, HEARD> {
     }
 
     /// Reads once and takes in what came; gives the outcome of the request with a number if that is among it.
-    fn listen(&mut self, id: Option<u16>) -> Result<Option<Outcome>, ClientError> {
+    fn await_reply(&mut self, id: Option<u16>) -> Result<Option<Outcome>, ClientError> {
         let mut buffer = [0; BUFFER_BYTES];
         let count = match self.line.read(&mut buffer) {
             Ok(0) => return Err(ClientError::Line(io::ErrorKind::UnexpectedEof.into())),
@@ -163,23 +171,16 @@ impl<LINE: Read + Write, HEARD: FnMut(Header, &Message)> Client<LINE, HEARD> {
             Err(error) => return Err(error.into()),
         };
         let mut outcome = None;
-        let mut rest = &buffer[..count];
-        loop {
-            rest = match self.decoder.feed(rest) {
-                Progress::NeedsMore => return Ok(outcome),
-                Progress::Error { rest, .. } => rest,
-                Progress::Message { header, message, rest } => {
-                    if let Message::Reply(reply) = message
-                        && Some(reply.request) == id
-                    {
-                        outcome = Some(reply.outcome);
-                    }
-                    self.picture.apply(header, &message);
-                    (self.heard)(header, &message);
-                    rest
-                }
-            };
-        }
+        let heard = &mut self.heard;
+        self.listener.feed(&buffer[..count], |listener, event| {
+            if let Event::Message(_, Message::Reply(reply)) = event
+                && Some(reply.request) == id
+            {
+                outcome = Some(reply.outcome);
+            }
+            heard(listener, event);
+        });
+        Ok(outcome)
     }
 }
 

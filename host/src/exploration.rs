@@ -167,8 +167,10 @@ impl<'buffer> Exploration<'buffer> {
         self.rover.follow(suggestion);
     }
 
-    /// All of it: a frame, a turn of the robot's main loop, and the way to the next frame.
+    /// All of it: a frame, a turn of the robot's main loop, and the way to the next frame. What the robot says meanwhile is
+    /// what its board then has sent.
     pub fn advance(&mut self) -> Seen {
+        self.board.sent.clear();
         let mut frame = self.frame();
         if let Some((ring, line)) = &mut self.injectors {
             frame = ring.disturb(frame, &mut self.ring_faults);
@@ -178,7 +180,6 @@ impl<'buffer> Exploration<'buffer> {
         }
         let seen = self.map(&frame);
         self.drive(self.board.suggestion);
-        self.board.sent.clear();
         seen
     }
 

@@ -6,9 +6,11 @@
 //! drove, and [`laps`] compares the laps of a round. [`exploration`] is a whole robot that drives through such a building by its
 //! own code, [`injector`] makes the faults that it meets, and [`soak`] lets it live with them for a day. [`emulator`] runs the
 //! firmware with such frames, and
-//! [`chip`] answers for the chips on its sensor bus; [`client`] tells a robot on a [`mod@line`] what to do. [`picture`] draws a map over its floor plan, and [`evaluation`]
+//! [`chip`] answers for the chips on its sensor bus; [`listener`] understands what a robot says, [`client`] tells one on a [`mod@line`] what to do, and [`topology`] is its map as
+//! plain data; [`broadcast`] is the robot's end of such a line. [`picture`] draws a map over its floor plan, and [`evaluation`]
 //! measures how often maps are right.
 
+pub mod broadcast;
 pub mod chip;
 pub mod client;
 pub mod emulator;
@@ -17,9 +19,11 @@ pub mod exploration;
 pub mod injector;
 pub mod laps;
 pub mod line;
+pub mod listener;
 pub mod mapping;
 pub mod nearness;
 pub mod picture;
 pub mod recording;
 pub mod soak;
+pub mod topology;
 pub mod world;

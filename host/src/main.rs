@@ -26,7 +26,9 @@ enum Task {
     Replay(command::replay::Arguments),
     /// Measure how often the maps of many random paths are right.
     Evaluate(command::evaluate::Arguments),
-    /// Tell a robot on a serial line what to do.
+    /// Be a simulated robot at the other end of a TCP line.
+    Robot(command::robot::Arguments),
+    /// Tell a robot on a line what to do.
     Command(command::console::Arguments),
 }
 
@@ -38,6 +40,7 @@ fn main() -> anyhow::Result<()> {
         Task::Soak(arguments) => command::soak::run(&arguments),
         Task::Replay(arguments) => command::replay::run(&arguments),
         Task::Evaluate(arguments) => command::evaluate::run(&arguments),
+        Task::Robot(arguments) => command::robot::run(&arguments),
         Task::Command(arguments) => command::console::run(&arguments),
     }
 }

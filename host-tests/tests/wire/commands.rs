@@ -6,10 +6,11 @@ use super::samples::{largest_requests, requests};
 use std::cell::RefCell;
 use std::rc::Rc;
 use std::time::Duration;
-use toposlam::wire::{CHUNK_BYTES, Command, Header, Message, Refusal, ResetCause, Setting, Version};
+use toposlam::wire::{CHUNK_BYTES, Command, Message, Refusal, ResetCause, Setting, Version};
 use toposlam_host::client::{Client, ClientError};
+use toposlam_host::listener::{Event, Listener};
 
-type FakeClient = Client<FakeLine, fn(Header, &Message)>;
+type FakeClient = Client<FakeLine, fn(&Listener, Event<'_>)>;
 
 /// A client of a fake robot, over a line that damages.
 fn client(damage: Damage) -> (FakeClient, Rc<RefCell<FakeRobot>>) {
@@ -79,10 +80,10 @@ fn a_reset_robot_tells_that_every_vertex_is_gone() {
         robot.borrow_mut().turn(&[]);
     }
     client.map().unwrap();
-    assert!(client.picture().vertices() > 4 && client.picture().location().is_some());
+    assert!(client.listener().picture().vertices() > 4 && client.listener().picture().location().is_some());
     client.order(Command::Reset).unwrap();
     client.info().unwrap();
-    assert_eq!((client.picture().vertices(), client.picture().location()), (0, None));
+    assert_eq!((client.listener().picture().vertices(), client.listener().picture().location()), (0, None));
     assert_eq!(client.map().unwrap().vertices(), robot.borrow().mapper.map().vertices());
 }
 

@@ -4,9 +4,10 @@ use std::path::PathBuf;
 
 use anyhow::Context;
 use clap::{Args, Subcommand, ValueEnum};
-use toposlam::wire::{Command, Header, Info, Message, Picture, Setting};
+use toposlam::wire::{Command, Info, Picture, Setting};
 use toposlam_host::client::Client;
 use toposlam_host::line::{Line, open};
+use toposlam_host::listener::{Event, Listener};
 
 /// Arguments of `toposlam command`.
 #[derive(Args)]
@@ -107,7 +108,7 @@ impl SettingName {
 
 pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     let line = open(&arguments.line, arguments.baud)?;
-    let mut client = Client::new(line, rand::random(), |_, _: &Message| {});
+    let mut client = Client::new(line, rand::random(), |_: &Listener, _: Event<'_>| {});
     client.timeout = std::time::Duration::from_millis(arguments.timeout_ms);
     client.attempts = arguments.attempts;
     match &arguments.action {
@@ -135,7 +136,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     Ok(())
 }
 
-fn order(client: &mut Client<Box<dyn Line>, impl FnMut(Header, &Message)>, command: Command) -> anyhow::Result<()> {
+fn order(client: &mut Client<Box<dyn Line>, impl FnMut(&Listener, Event<'_>)>, command: Command) -> anyhow::Result<()> {
     client.order(command)?;
     println!("done");
     Ok(())

@@ -10,5 +10,6 @@ mod filter;
 mod hardship;
 mod rails;
 pub(crate) mod replay;
+pub(crate) mod robot;
 pub(crate) mod simulate;
 pub(crate) mod soak;
