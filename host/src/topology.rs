@@ -6,15 +6,15 @@
 //! use toposlam_host::topology::TopologicalMap;
 //!
 //! let mut map: Map<8> = Map::new();
-//! let hall = map.add_vertex(Fingerprint::from_radius_mm(1200))?;
-//! let door = map.add_vertex(Fingerprint::from_radius_mm(400))?;
+//! let hall = map.add_vertex(Fingerprint::from_radius_mm(1200)?)?;
+//! let door = map.add_vertex(Fingerprint::from_radius_mm(400)?)?;
 //! map.add_edge(hall, door);
 //!
 //! let topology = TopologicalMap::from(&map);
 //! assert_eq!(topology.edges, [(0, 1)]);
 //! assert_eq!(topology.vertices[1].radius_mm, 400);
 //! assert_eq!(connected_components(&topology.to_petgraph()), 1);
-//! # Ok::<(), toposlam::VerticesFull>(())
+//! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
 use petgraph::graph::UnGraph;
