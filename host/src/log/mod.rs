@@ -27,6 +27,8 @@ mod error;
 mod recorder;
 mod recording;
 mod scene;
+#[cfg(test)]
+mod tests;
 mod topics;
 
 use std::path::Path;

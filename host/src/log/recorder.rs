@@ -65,7 +65,12 @@ impl<FILE: Write> Recorder<FILE> {
     /// When the file cannot be written.
     pub fn new(file: FILE) -> Result<Self, LogError> {
         Ok(Self {
-            notes: Notes { topics: Topics::create(file)?, layout: Layout::new(), drawn: None, faults: [0; FAULT_KINDS] },
+            notes: Notes {
+                topics: Topics::create(file)?,
+                layout: Layout::new(),
+                drawn: None,
+                faults: [0; FAULT_KINDS],
+            },
             listener: Listener::new(),
             piece: Vec::with_capacity(PIECE_BYTES),
             newest_ns: 0,
