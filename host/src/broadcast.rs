@@ -44,6 +44,11 @@ impl Broadcast {
         self.listeners.len()
     }
 
+    /// How many bytes are still on their way to the slowest of them.
+    pub fn unsent_bytes(&self) -> usize {
+        self.listeners.iter().map(|listener| listener.unsent.len()).max().unwrap_or(0)
+    }
+
     /// Says something to all and gives what they said meanwhile. Never waits; who went away is forgotten.
     pub fn exchange(&mut self, said: &[u8]) -> Vec<u8> {
         while let Ok((stream, _)) = self.port.accept() {

@@ -28,6 +28,10 @@ enum Task {
     Evaluate(command::evaluate::Arguments),
     /// Be a simulated robot at the other end of a TCP line.
     Robot(command::robot::Arguments),
+    /// Keep what a robot on a line says in an MCAP file.
+    Record(command::record::Arguments),
+    /// Hear a recording of `record` again, or let others hear it.
+    Play(command::play::Arguments),
     /// Tell a robot on a line what to do.
     Command(command::console::Arguments),
 }
@@ -41,6 +45,8 @@ fn main() -> anyhow::Result<()> {
         Task::Replay(arguments) => command::replay::run(&arguments),
         Task::Evaluate(arguments) => command::evaluate::run(&arguments),
         Task::Robot(arguments) => command::robot::run(&arguments),
+        Task::Record(arguments) => command::record::run(&arguments),
+        Task::Play(arguments) => command::play::run(&arguments),
         Task::Command(arguments) => command::console::run(&arguments),
     }
 }

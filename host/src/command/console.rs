@@ -158,7 +158,7 @@ fn print_info(info: &Info) {
     }
 }
 
-fn print_map(picture: &Picture<64>) {
+pub(super) fn print_map(picture: &Picture<64>) {
     println!("map: {} vertices, {} edges", picture.vertices(), picture.edges().count());
     for row in (0..picture.vertices()).filter_map(|vertex| picture.row(vertex)) {
         println!("  vertex {:2}: radius {:4} mm, {} visits", row.vertex, row.radius_mm, row.visits);

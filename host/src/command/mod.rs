@@ -1,5 +1,5 @@
 //! The subcommands, a file each: its arguments and what it does with them. `drive` is what two of them share,
-//! `filter` what three of them let choose, `hardship` what `emulate` does with faults.
+//! `filter` what three of them let choose, `hardship` what `emulate` does with faults, `interrupt` Ctrl-C.
 
 pub(crate) mod console;
 mod drive;
@@ -8,7 +8,10 @@ pub(crate) mod evaluate;
 pub(crate) mod explore;
 mod filter;
 mod hardship;
+mod interrupt;
+pub(crate) mod play;
 mod rails;
+pub(crate) mod record;
 pub(crate) mod replay;
 pub(crate) mod robot;
 pub(crate) mod simulate;

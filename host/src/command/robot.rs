@@ -37,7 +37,8 @@ pub(crate) struct Arguments {
     places: usize,
 }
 
-fn speed(text: &str) -> Result<f64, String> {
+/// A pace, 1 being that of a clock.
+pub(super) fn speed(text: &str) -> Result<f64, String> {
     let speed = text.parse().map_err(|error| format!("{error}"))?;
     if (0.01..=1000.0).contains(&speed) { Ok(speed) } else { Err("must be 0.01 to 1000".to_owned()) }
 }

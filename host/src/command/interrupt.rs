@@ -1,0 +1,26 @@
+//! Ctrl-C as a flag, for commands that have something to finish.
+
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+use signal_hook::consts::{SIGINT, SIGTERM};
+use signal_hook::flag;
+
+/// Whether the program was told to end.
+pub(super) struct Interrupt(Arc<AtomicBool>);
+
+impl Interrupt {
+    /// Watches from here on. A second Ctrl-C ends the program at once.
+    pub(super) fn watch() -> std::io::Result<Self> {
+        let told = Arc::new(AtomicBool::new(false));
+        for signal in [SIGINT, SIGTERM] {
+            flag::register_conditional_shutdown(signal, 1, Arc::clone(&told))?;
+            flag::register(signal, Arc::clone(&told))?;
+        }
+        Ok(Self(told))
+    }
+
+    pub(super) fn is_told(&self) -> bool {
+        self.0.load(Ordering::Relaxed)
+    }
+}

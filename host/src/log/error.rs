@@ -1,0 +1,51 @@
+//! What can go wrong with a recording.
+
+use std::{fmt, io};
+
+use mcap::McapError;
+
+/// Why a recording cannot be written or read.
+#[derive(Debug)]
+pub enum LogError {
+    /// The file cannot be opened, written or read.
+    File(io::Error),
+    /// The file is not MCAP, or damaged.
+    Mcap(McapError),
+    /// The file is a whole MCAP file, but nothing of it is from a robot's line.
+    NoFrames,
+}
+
+impl From<io::Error> for LogError {
+    fn from(error: io::Error) -> Self {
+        Self::File(error)
+    }
+}
+
+impl From<McapError> for LogError {
+    fn from(error: McapError) -> Self {
+        match error {
+            McapError::Io(error) => Self::File(error),
+            other => Self::Mcap(other),
+        }
+    }
+}
+
+impl fmt::Display for LogError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::File(_) => f.write_str("the file of the recording failed"),
+            Self::Mcap(_) => f.write_str("the recording is no MCAP file or damaged"),
+            Self::NoFrames => f.write_str("the MCAP file holds no frames of a toposlam robot"),
+        }
+    }
+}
+
+impl std::error::Error for LogError {
+    fn source(&self) -> Option<&(dyn std::error::Error + 'static)> {
+        match self {
+            Self::File(error) => Some(error),
+            Self::Mcap(error) => Some(error),
+            Self::NoFrames => None,
+        }
+    }
+}
