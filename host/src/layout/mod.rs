@@ -1,16 +1,34 @@
 //! Where to draw the vertices of a map that has no positions: a picture that does not jump from one update to the next.
 //!
+//! No edges cross where the graph allows that, and no vertex lies on another or on an edge of others. A vertex keeps its
+//! position as long as that is so; a new one goes beside its neighbours.
+//!
 //! ```
 //! use toposlam_host::layout::Layout;
 //! use toposlam_host::topology::{TopologicalMap, Vertex};
 //!
 //! let mut layout = Layout::new();
 //! layout.arrange(&TopologicalMap { vertices: vec![Vertex::default(); 3], edges: vec![(0, 1), (1, 2)] });
-//! assert_eq!(layout.points().len(), 3);
+//! let before = layout.points().to_vec();
+//! layout.arrange(&TopologicalMap { vertices: vec![Vertex::default(); 4], edges: vec![(0, 1), (0, 3), (1, 2), (2, 3)] });
+//! assert_eq!(layout.points()[..3], before);
 //! ```
+
+mod comfort;
+mod conflicts;
+mod drawing;
+mod embedding;
+mod geometry;
+mod graph;
+mod placement;
+mod redrawing;
+mod smoothing;
+mod triangulation;
+mod untangling;
 
 use toposlam::wire::Renamed;
 
+use self::graph::Graph;
 use crate::topology::TopologicalMap;
 
 /// A position in the picture; an edge is about 1 long. `y` points up.
@@ -23,33 +41,87 @@ pub struct Point {
 }
 
 /// Positions for the vertices of a map that grows.
+///
+/// The same maps in the same order give the same picture.
 #[derive(Clone, Debug, Default)]
 pub struct Layout {
+    graph: Graph,
     points: Vec<Point>,
 }
 
 impl Layout {
     /// An empty picture.
-    pub const fn new() -> Self {
-        Self { points: Vec::new() }
+    pub fn new() -> Self {
+        Self::default()
     }
 
     /// Gives every vertex of the map a position; those that have one keep it as far as possible.
+    ///
+    /// Edges of a map that is planar do not cross. Any two vertices are 0.35 apart or more, and a vertex is 0.12 or more from an edge
+    /// that does not end at it; on a map that is not planar both as far as possible. Self-loops and labels play no part.
+    /// Cost: nothing to speak of when the graph is the one before.
     pub fn arrange(&mut self, map: &TopologicalMap) {
-        let count = map.vertices.len();
-        let angle = |vertex: usize| std::f64::consts::TAU * vertex as f64 / count as f64;
-        let radius = count as f64 / 6.0;
-        let point = |vertex| Point { x: radius * angle(vertex).cos(), y: radius * angle(vertex).sin() };
-        self.points = (0..count).map(point).collect();
+        let graph = Graph::of(map);
+        if graph == self.graph && self.points.iter().all(|point| point.is_known()) {
+            return;
+        }
+        self.graph = graph;
+        self.points.resize(self.graph.vertices(), Point::UNKNOWN);
+        let before = self.points.clone();
+        self.place_new();
+        let left = untangling::untangle(&self.graph, &mut self.points);
+        if left == 0 {
+            return;
+        }
+        let points = redrawing::redraw(&self.graph, &before);
+        // Where crossings cannot be helped, few of them do not make up for a picture that jumps.
+        let redrawn = conflicts::conflicts(&self.graph, &points);
+        if redrawn == 0 || 2 * redrawn < left {
+            self.points = points;
+        }
     }
 
     /// The robot has given its vertices new numbers: each keeps its position under the new one.
+    ///
+    /// Of vertices that are one now, the first one's position stays. [`Layout::arrange`] is to follow: until then a vertex without
+    /// a position is at NaN.
     pub fn rename(&mut self, renamed: &Renamed) {
-        let _ = renamed;
+        let mut points = Vec::new();
+        for (before, &point) in (0..=u8::MAX).zip(&self.points) {
+            let Some(now) = renamed.now(before).map(usize::from) else { continue };
+            if now >= points.len() {
+                points.resize(now + 1, Point::UNKNOWN);
+            }
+            if !points[now].is_known() {
+                points[now] = point;
+            }
+        }
+        self.points = points;
+        self.graph = Graph::default();
     }
 
     /// The position of every vertex.
     pub fn points(&self) -> &[Point] {
         &self.points
     }
+
+    /// Places the vertices that have no position, those with most neighbours in the picture first.
+    fn place_new(&mut self) {
+        let mut new = Vec::new();
+        loop {
+            let graph = &self.graph;
+            let known = |vertex: usize| {
+                graph.neighbours(vertex).iter().filter(|&&neighbour| self.points[neighbour].is_known()).count()
+            };
+            let waiting = (0..self.points.len()).rev().filter(|&vertex| !self.points[vertex].is_known());
+            let Some(vertex) = waiting.max_by_key(|&vertex| known(vertex)) else { break };
+            self.points[vertex] = placement::place(graph, &self.points, vertex);
+            new.push(vertex);
+        }
+        let nowhere = vec![Point::UNKNOWN; self.points.len()];
+        smoothing::smooth(&self.graph, &mut self.points, &new, &nowhere, 20);
+    }
 }
+
+#[cfg(test)]
+mod tests;

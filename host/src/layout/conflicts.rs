@@ -1,0 +1,100 @@
+//! What no picture should have: edges that cross, vertices too close to each other, and vertices on edges of others.
+
+use super::{Point, geometry, graph::Graph};
+
+/// Vertices are at least this far apart.
+pub(super) const VERTEX_CLEARANCE: f64 = 0.35;
+
+/// A vertex is at least this far from an edge that does not end at it.
+pub(super) const EDGE_CLEARANCE: f64 = 0.12;
+
+/// How much worse it is that something hides something than that edges cross.
+const HIDING: u32 = 5;
+
+/// How much conflicts with the rest of the picture when `vertex` is at a point; 0 when nothing does.
+pub(super) fn conflicts_of(graph: &Graph, points: &[Point], vertex: usize, at: Point) -> u32 {
+    let mut conflicts = 0;
+    for (other, &point) in points.iter().enumerate() {
+        if other == vertex {
+            continue;
+        }
+        conflicts += hiding((point - at).squared(), VERTEX_CLEARANCE);
+        for &neighbour in graph.neighbours(vertex).iter().filter(|&&neighbour| neighbour != other) {
+            conflicts += hiding(geometry::squared_distance(point, (at, points[neighbour])), EDGE_CLEARANCE);
+        }
+    }
+    for &(a, b) in graph.edges().iter().filter(|&&(a, b)| a != vertex && b != vertex) {
+        let edge = (points[a], points[b]);
+        conflicts += hiding(geometry::squared_distance(at, edge), EDGE_CLEARANCE);
+        for &neighbour in graph.neighbours(vertex).iter().filter(|&&neighbour| neighbour != a && neighbour != b) {
+            conflicts += u32::from(geometry::cross((at, points[neighbour]), edge));
+        }
+    }
+    conflicts
+}
+
+/// How much conflicts in a whole picture; 0 when nothing does.
+pub(super) fn conflicts(graph: &Graph, points: &[Point]) -> u32 {
+    let edges = graph.edges();
+    let mut conflicts = crossings(graph, points);
+    for (vertex, &point) in points.iter().enumerate() {
+        for &other in &points[..vertex] {
+            conflicts += hiding((point - other).squared(), VERTEX_CLEARANCE);
+        }
+        for &(a, b) in edges.iter().filter(|&&(a, b)| a != vertex && b != vertex) {
+            conflicts += hiding(geometry::squared_distance(point, (points[a], points[b])), EDGE_CLEARANCE);
+        }
+    }
+    conflicts
+}
+
+/// How many pairs of edges cross.
+pub(super) fn crossings(graph: &Graph, points: &[Point]) -> u32 {
+    let segment = |(a, b): (usize, usize)| (points[a], points[b]);
+    let mut crossings = 0;
+    for (index, &(a, b)) in graph.edges().iter().enumerate() {
+        for &(c, d) in &graph.edges()[..index] {
+            let apart = a != c && a != d && b != c && b != d;
+            crossings += u32::from(apart && geometry::cross(segment((a, b)), segment((c, d))));
+        }
+    }
+    crossings
+}
+
+/// By how much a picture has to grow so that nothing hides anything; at least 1.
+pub(super) fn growth(graph: &Graph, points: &[Point]) -> f64 {
+    let mut growth: f64 = 1.0;
+    for (vertex, &point) in points.iter().enumerate() {
+        for &other in &points[..vertex] {
+            growth = growth.max(VERTEX_CLEARANCE / (point - other).length());
+        }
+        for &(a, b) in graph.edges().iter().filter(|&&(a, b)| a != vertex && b != vertex) {
+            growth = growth.max(EDGE_CLEARANCE / geometry::squared_distance(point, (points[a], points[b])).sqrt());
+        }
+    }
+    growth
+}
+
+fn hiding(squared: f64, clearance: f64) -> u32 {
+    if squared < clearance * clearance { HIDING } else { 0 }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_conflicts_of_one_vertex_are_those_that_go_with_it() {
+        let mut graph = Graph::new(6);
+        [(0, 1), (2, 3), (4, 5)].into_iter().for_each(|(a, b)| graph.connect(a, b));
+        let at = |x, y| Point::new(x, y);
+        let mut points = vec![at(0.0, 0.0), at(2.0, 0.0), at(1.0, -1.0), at(1.0, 1.0), at(0.5, 0.05), at(0.5, 3.0)];
+        let everything = conflicts(&graph, &points);
+        assert_eq!(everything, 1 + HIDING);
+        assert_eq!(conflicts_of(&graph, &points, 3, points[3]), 1);
+        let better = conflicts_of(&graph, &points, 1, at(-2.0, 0.0));
+        assert_eq!(everything - conflicts_of(&graph, &points, 1, points[1]) + better, 0);
+        points[1] = at(-2.0, 0.0);
+        assert_eq!(conflicts(&graph, &points), 0);
+    }
+}

@@ -1,0 +1,124 @@
+//! Points and segments of the plane.
+
+use std::ops::{Add, Mul, Sub};
+
+use super::Point;
+
+impl Point {
+    /// Where a vertex is that has no position: near nothing, and its edges cross nothing, because no comparison holds.
+    pub(super) const UNKNOWN: Self = Self { x: f64::NAN, y: f64::NAN };
+
+    pub(super) const fn new(x: f64, y: f64) -> Self {
+        Self { x, y }
+    }
+
+    /// The point at a distance of 1 from the origin in a direction, counter-clockwise from the right.
+    pub(super) fn towards(angle: f64) -> Self {
+        Self::new(angle.cos(), angle.sin())
+    }
+
+    pub(super) const fn is_known(self) -> bool {
+        !self.x.is_nan()
+    }
+
+    pub(super) fn dot(self, other: Self) -> f64 {
+        self.x * other.x + self.y * other.y
+    }
+
+    /// Positive when `other` lies to the left.
+    pub(super) fn cross(self, other: Self) -> f64 {
+        self.x * other.y - self.y * other.x
+    }
+
+    pub(super) fn squared(self) -> f64 {
+        self.dot(self)
+    }
+
+    pub(super) fn length(self) -> f64 {
+        self.squared().sqrt()
+    }
+}
+
+impl Add for Point {
+    type Output = Self;
+
+    fn add(self, other: Self) -> Self {
+        Self::new(self.x + other.x, self.y + other.y)
+    }
+}
+
+impl Sub for Point {
+    type Output = Self;
+
+    fn sub(self, other: Self) -> Self {
+        Self::new(self.x - other.x, self.y - other.y)
+    }
+}
+
+impl Mul<f64> for Point {
+    type Output = Self;
+
+    fn mul(self, factor: f64) -> Self {
+        Self::new(self.x * factor, self.y * factor)
+    }
+}
+
+/// The mean of points; the origin for none.
+pub(super) fn mean(points: impl Iterator<Item = Point>) -> Point {
+    let (sum, count) = points.fold((Point::default(), 0), |(sum, count), point| (sum + point, count + 1));
+    if count == 0 { sum } else { sum * (1.0 / f64::from(count)) }
+}
+
+/// Whether two segments that share no end cross.
+pub(super) fn cross(first: (Point, Point), second: (Point, Point)) -> bool {
+    let parts = |(a, b): (Point, Point), (c, d): (Point, Point)| (b - a).cross(c - a) * (b - a).cross(d - a) < 0.0;
+    parts(first, second) && parts(second, first)
+}
+
+/// The square of the distance of a point from a segment.
+pub(super) fn squared_distance(point: Point, (a, b): (Point, Point)) -> f64 {
+    let along = b - a;
+    let share = ((point - a).dot(along) / along.squared().max(f64::MIN_POSITIVE)).clamp(0.0, 1.0);
+    (a + along * share - point).squared()
+}
+
+/// The smallest and the largest coordinates of the points that are known; `None` for none.
+pub(super) fn bounds(points: &[Point]) -> Option<(Point, Point)> {
+    let known = points.iter().copied().filter(|point| point.is_known());
+    known.fold(None, |bounds, point| {
+        let (low, high) = bounds.unwrap_or((point, point));
+        let low = Point::new(low.x.min(point.x), low.y.min(point.y));
+        Some((low, Point::new(high.x.max(point.x), high.y.max(point.y))))
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const O: Point = Point::new(0.0, 0.0);
+
+    #[test]
+    fn segments_that_cross_are_told_from_those_that_do_not() {
+        let segment = |a: (f64, f64), b: (f64, f64)| (Point::new(a.0, a.1), Point::new(b.0, b.1));
+        let diagonal = segment((0.0, 0.0), (2.0, 2.0));
+        assert!(cross(diagonal, segment((0.0, 2.0), (2.0, 0.0))));
+        assert!(!cross(diagonal, segment((0.0, 2.0), (0.9, 1.1))));
+        assert!(!cross(diagonal, segment((3.0, 0.0), (3.0, 9.0))));
+        assert!(!cross(diagonal, (O, Point::UNKNOWN)));
+    }
+
+    #[test]
+    fn the_distance_from_a_segment_is_that_from_its_nearest_point() {
+        let segment = (O, Point::new(2.0, 0.0));
+        assert_eq!(squared_distance(Point::new(1.0, 3.0), segment), 9.0);
+        assert_eq!(squared_distance(Point::new(4.0, 0.0), segment), 4.0);
+        assert_eq!(squared_distance(Point::new(0.0, 1.0), (O, O)), 1.0);
+    }
+
+    #[test]
+    fn a_vertex_without_a_position_is_no_part_of_the_picture() {
+        assert_eq!(bounds(&[Point::UNKNOWN]), None);
+        assert_eq!(bounds(&[Point::new(1.0, 2.0), Point::UNKNOWN]), Some((Point::new(1.0, 2.0), Point::new(1.0, 2.0))));
+    }
+}
