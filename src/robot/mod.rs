@@ -60,7 +60,7 @@ use crate::drive::{Drive, Goal, Journey, Suggestion};
 use crate::place::Place;
 use crate::ring::RingFrame;
 use crate::snapshot::{DRIVE_SECTION, Resume, Snapshot, SnapshotError, SnapshotPolicy, Writer};
-use crate::wire::{self, Encoder, Health, Inbox, MAX_FRAME_BYTES, Message, QueueFull, Staging};
+use crate::wire::{self, Echoes, Encoder, Health, Inbox, MAX_FRAME_BYTES, Message, QueueFull, Staging};
 use crate::{FaultCounters, FaultKind, Mapper, RobustFilter, Update};
 
 /// How often the robot says how it is doing, in turns of the loop.
@@ -156,6 +156,7 @@ impl<'buffer, const SONARS: usize, const N: usize, const V: usize, const HISTORY
         let faults = self.loop_faults(ring_faults);
         let (seen, suggestion) =
             if self.paused { self.stand(&faults, board) } else { self.map_and_drive(frame, &faults, board) };
+        self.tell_ring(frame, board);
         self.tell_drive(suggestion, board);
         let is_due = |(_, update): &(Place, Update)| self.policy().is_due(update.place_index);
         if seen.as_ref().is_some_and(is_due) {
@@ -257,6 +258,12 @@ impl<'buffer, const SONARS: usize, const N: usize, const V: usize, const HISTORY
             }
         }
         self.last_turn_ms = Some(now_ms);
+    }
+
+    #[inline(never)]
+    fn tell_ring(&mut self, frame: &RingFrame<SONARS>, board: &mut impl Board) {
+        let ring = Message::Ring { frame_index: self.turns, echoes: Echoes::new(&frame.echoes) };
+        let _ = self.send(&ring, board);
     }
 
     fn tell_drive(&mut self, suggestion: Suggestion, board: &mut impl Board) {
