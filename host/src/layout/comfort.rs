@@ -67,11 +67,14 @@ fn narrowness(first: Point, second: Point) -> f64 {
 
 /// Grows towards an edge, and without end when it comes too close.
 fn crowding(point: Point, edge: (Point, Point)) -> f64 {
-    let squared = geometry::squared_distance(point, edge);
-    if squared > MARGIN * MARGIN {
+    if !geometry::may_be_near(point, edge, MARGIN) {
         return 0.0;
     }
-    let distance = squared.sqrt();
-    let lack = MARGIN - distance;
-    MARGIN_WEIGHT * lack * lack + HIDING_WEIGHT * (EDGE_CLEARANCE / distance.max(1e-9) - 1.0).max(0.0)
+    let distance = geometry::squared_distance(point, edge).sqrt();
+    if distance < MARGIN {
+        let lack = MARGIN - distance;
+        MARGIN_WEIGHT * lack * lack + HIDING_WEIGHT * (EDGE_CLEARANCE / distance.max(1e-9) - 1.0).max(0.0)
+    } else {
+        0.0
+    }
 }

@@ -17,7 +17,7 @@ const HIDING: u32 = 5;
 pub(super) fn conflicts_of(graph: &Graph, points: &[Point], vertex: usize, at: Point, limit: u32) -> u32 {
     let mut conflicts = 0;
     for &point in points[..vertex].iter().chain(&points[vertex + 1..]) {
-        conflicts += hiding((point - at).squared(), VERTEX_CLEARANCE);
+        conflicts += hiding_vertex(point, at);
     }
     let neighbours = graph.neighbours(vertex);
     for &(a, b) in graph.edges().iter().filter(|&&(a, b)| a != vertex && b != vertex) {
@@ -25,7 +25,7 @@ pub(super) fn conflicts_of(graph: &Graph, points: &[Point], vertex: usize, at: P
             return conflicts;
         }
         let edge = (points[a], points[b]);
-        conflicts += hiding(geometry::squared_distance(at, edge), EDGE_CLEARANCE);
+        conflicts += hiding_edge(at, edge);
         for &neighbour in neighbours.iter().filter(|&&neighbour| neighbour != a && neighbour != b) {
             conflicts += u32::from(geometry::cross((at, points[neighbour]), edge));
         }
@@ -37,7 +37,7 @@ pub(super) fn conflicts_of(graph: &Graph, points: &[Point], vertex: usize, at: P
         let edge = (at, points[neighbour]);
         for (other, &point) in points.iter().enumerate() {
             if other != vertex && other != neighbour {
-                conflicts += hiding(geometry::squared_distance(point, edge), EDGE_CLEARANCE);
+                conflicts += hiding_edge(point, edge);
             }
         }
     }
@@ -64,10 +64,10 @@ pub(super) fn conflicts(graph: &Graph, points: &[Point]) -> u32 {
     let mut conflicts = crossings(graph, points);
     for (vertex, &point) in points.iter().enumerate() {
         for &other in &points[..vertex] {
-            conflicts += hiding((point - other).squared(), VERTEX_CLEARANCE);
+            conflicts += hiding_vertex(point, other);
         }
         for &(a, b) in edges.iter().filter(|&&(a, b)| a != vertex && b != vertex) {
-            conflicts += hiding(geometry::squared_distance(point, (points[a], points[b])), EDGE_CLEARANCE);
+            conflicts += hiding_edge(point, (points[a], points[b]));
         }
     }
     conflicts
@@ -100,8 +100,19 @@ pub(super) fn growth(graph: &Graph, points: &[Point]) -> f64 {
     if growth > 1.0 { growth * (1.0 + 1e-9) } else { growth }
 }
 
-fn hiding(squared: f64, clearance: f64) -> u32 {
-    if squared < clearance * clearance { HIDING } else { 0 }
+fn hiding_vertex(point: Point, other: Point) -> u32 {
+    hiding((point - other).squared() < VERTEX_CLEARANCE * VERTEX_CLEARANCE)
+}
+
+fn hiding_edge(point: Point, edge: (Point, Point)) -> u32 {
+    hiding(
+        geometry::may_be_near(point, edge, EDGE_CLEARANCE)
+            && geometry::squared_distance(point, edge) < EDGE_CLEARANCE * EDGE_CLEARANCE,
+    )
+}
+
+const fn hiding(is_hidden: bool) -> u32 {
+    if is_hidden { HIDING } else { 0 }
 }
 
 #[cfg(test)]

@@ -87,6 +87,12 @@ pub(super) fn squared_distance(point: Point, (a, b): (Point, Point)) -> f64 {
     (a + along * share - point).squared()
 }
 
+/// Whether a point may be as near to a segment as that: quick, and wrong only at the corners.
+pub(super) fn may_be_near(point: Point, (a, b): (Point, Point), distance: f64) -> bool {
+    let spans = |one: f64, other: f64, at: f64| at > one.min(other) - distance && at < one.max(other) + distance;
+    spans(a.x, b.x, point.x) && spans(a.y, b.y, point.y)
+}
+
 /// The smallest and the largest coordinates of the points that are known; `None` for none.
 pub(super) fn bounds(points: &[Point]) -> Option<(Point, Point)> {
     let known = points.iter().copied().filter(|point| point.is_known());

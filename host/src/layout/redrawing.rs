@@ -13,7 +13,7 @@ use super::{
 };
 
 /// Sweeps of smoothing of a drawing, and again when it is laid over the picture before.
-const SWEEPS: u32 = 20;
+const SWEEPS: u32 = 16;
 
 /// A picture that has to grow by more than this, so that nothing hides anything, is drawn in another way.
 const TOO_SMALL: f64 = 2.0;
