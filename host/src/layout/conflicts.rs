@@ -12,25 +12,50 @@ pub(super) const EDGE_CLEARANCE: f64 = 0.12;
 const HIDING: u32 = 5;
 
 /// How much conflicts with the rest of the picture when `vertex` is at a point; 0 when nothing does.
-pub(super) fn conflicts_of(graph: &Graph, points: &[Point], vertex: usize, at: Point) -> u32 {
+///
+/// Counting ends when there is more than `limit`.
+pub(super) fn conflicts_of(graph: &Graph, points: &[Point], vertex: usize, at: Point, limit: u32) -> u32 {
     let mut conflicts = 0;
-    for (other, &point) in points.iter().enumerate() {
-        if other == vertex {
-            continue;
-        }
-        conflicts += hiding((point - at).squared(), VERTEX_CLEARANCE);
-        for &neighbour in graph.neighbours(vertex).iter().filter(|&&neighbour| neighbour != other) {
-            conflicts += hiding(geometry::squared_distance(point, (at, points[neighbour])), EDGE_CLEARANCE);
-        }
+    for &point in points[..vertex].iter().chain(&points[vertex + 1..]) {
+        conflicts += hiding_vertex(point, at);
     }
+    let neighbours = graph.neighbours(vertex);
     for &(a, b) in graph.edges().iter().filter(|&&(a, b)| a != vertex && b != vertex) {
+        if conflicts > limit {
+            return conflicts;
+        }
         let edge = (points[a], points[b]);
-        conflicts += hiding(geometry::squared_distance(at, edge), EDGE_CLEARANCE);
-        for &neighbour in graph.neighbours(vertex).iter().filter(|&&neighbour| neighbour != a && neighbour != b) {
+        conflicts += hiding_edge(at, edge);
+        for &neighbour in neighbours.iter().filter(|&&neighbour| neighbour != a && neighbour != b) {
             conflicts += u32::from(geometry::cross((at, points[neighbour]), edge));
         }
     }
+    for &neighbour in neighbours {
+        if conflicts > limit {
+            return conflicts;
+        }
+        let edge = (at, points[neighbour]);
+        for (other, &point) in points.iter().enumerate() {
+            if other != vertex && other != neighbour {
+                conflicts += hiding_edge(point, edge);
+            }
+        }
+    }
     conflicts
+}
+
+/// How many edges the edges of `vertex` cross when it is at a point. Counting ends when they are more than `limit`.
+pub(super) fn crossings_of(graph: &Graph, points: &[Point], vertex: usize, at: Point, limit: u32) -> u32 {
+    let mut crossings = 0;
+    for &(a, b) in graph.edges().iter().filter(|&&(a, b)| a != vertex && b != vertex) {
+        for &neighbour in graph.neighbours(vertex).iter().filter(|&&neighbour| neighbour != a && neighbour != b) {
+            crossings += u32::from(geometry::cross((at, points[neighbour]), (points[a], points[b])));
+        }
+        if crossings > limit {
+            break;
+        }
+    }
+    crossings
 }
 
 /// How much conflicts in a whole picture; 0 when nothing does.
@@ -39,10 +64,10 @@ pub(super) fn conflicts(graph: &Graph, points: &[Point]) -> u32 {
     let mut conflicts = crossings(graph, points);
     for (vertex, &point) in points.iter().enumerate() {
         for &other in &points[..vertex] {
-            conflicts += hiding((point - other).squared(), VERTEX_CLEARANCE);
+            conflicts += hiding_vertex(point, other);
         }
         for &(a, b) in edges.iter().filter(|&&(a, b)| a != vertex && b != vertex) {
-            conflicts += hiding(geometry::squared_distance(point, (points[a], points[b])), EDGE_CLEARANCE);
+            conflicts += hiding_edge(point, (points[a], points[b]));
         }
     }
     conflicts
@@ -61,7 +86,7 @@ pub(super) fn crossings(graph: &Graph, points: &[Point]) -> u32 {
     crossings
 }
 
-/// By how much a picture has to grow so that nothing hides anything; at least 1.
+/// By how much a picture has to grow so that nothing hides anything, and a hair more; at least 1.
 pub(super) fn growth(graph: &Graph, points: &[Point]) -> f64 {
     let mut growth: f64 = 1.0;
     for (vertex, &point) in points.iter().enumerate() {
@@ -72,11 +97,22 @@ pub(super) fn growth(graph: &Graph, points: &[Point]) -> f64 {
             growth = growth.max(EDGE_CLEARANCE / geometry::squared_distance(point, (points[a], points[b])).sqrt());
         }
     }
-    growth
+    if growth > 1.0 { growth * (1.0 + 1e-9) } else { growth }
 }
 
-fn hiding(squared: f64, clearance: f64) -> u32 {
-    if squared < clearance * clearance { HIDING } else { 0 }
+fn hiding_vertex(point: Point, other: Point) -> u32 {
+    hiding((point - other).squared() < VERTEX_CLEARANCE * VERTEX_CLEARANCE)
+}
+
+fn hiding_edge(point: Point, edge: (Point, Point)) -> u32 {
+    hiding(
+        geometry::may_be_near(point, edge, EDGE_CLEARANCE)
+            && geometry::squared_distance(point, edge) < EDGE_CLEARANCE * EDGE_CLEARANCE,
+    )
+}
+
+const fn hiding(is_hidden: bool) -> u32 {
+    if is_hidden { HIDING } else { 0 }
 }
 
 #[cfg(test)]
@@ -91,9 +127,9 @@ mod tests {
         let mut points = vec![at(0.0, 0.0), at(2.0, 0.0), at(1.0, -1.0), at(1.0, 1.0), at(0.5, 0.05), at(0.5, 3.0)];
         let everything = conflicts(&graph, &points);
         assert_eq!(everything, 1 + HIDING);
-        assert_eq!(conflicts_of(&graph, &points, 3, points[3]), 1);
-        let better = conflicts_of(&graph, &points, 1, at(-2.0, 0.0));
-        assert_eq!(everything - conflicts_of(&graph, &points, 1, points[1]) + better, 0);
+        assert_eq!(conflicts_of(&graph, &points, 3, points[3], 9), 1);
+        let better = conflicts_of(&graph, &points, 1, at(-2.0, 0.0), 9);
+        assert_eq!(everything - conflicts_of(&graph, &points, 1, points[1], 9) + better, 0);
         points[1] = at(-2.0, 0.0);
         assert_eq!(conflicts(&graph, &points), 0);
     }

@@ -71,8 +71,13 @@ pub(super) fn mean(points: impl Iterator<Item = Point>) -> Point {
 
 /// Whether two segments that share no end cross.
 pub(super) fn cross(first: (Point, Point), second: (Point, Point)) -> bool {
+    // Segments on one line are told apart by this alone, as their sides are rounding errors.
+    let beside = |of: fn(Point) -> f64, one: (Point, Point), other: (Point, Point)| {
+        of(one.0).max(of(one.1)) < of(other.0).min(of(other.1))
+    };
+    let apart = |of| beside(of, first, second) || beside(of, second, first);
     let parts = |(a, b): (Point, Point), (c, d): (Point, Point)| (b - a).cross(c - a) * (b - a).cross(d - a) < 0.0;
-    parts(first, second) && parts(second, first)
+    !apart(|point| point.x) && !apart(|point| point.y) && parts(first, second) && parts(second, first)
 }
 
 /// The square of the distance of a point from a segment.
@@ -80,6 +85,12 @@ pub(super) fn squared_distance(point: Point, (a, b): (Point, Point)) -> f64 {
     let along = b - a;
     let share = ((point - a).dot(along) / along.squared().max(f64::MIN_POSITIVE)).clamp(0.0, 1.0);
     (a + along * share - point).squared()
+}
+
+/// Whether a point may be as near to a segment as that: quick, and wrong only at the corners.
+pub(super) fn may_be_near(point: Point, (a, b): (Point, Point), distance: f64) -> bool {
+    let spans = |one: f64, other: f64, at: f64| at > one.min(other) - distance && at < one.max(other) + distance;
+    spans(a.x, b.x, point.x) && spans(a.y, b.y, point.y)
 }
 
 /// The smallest and the largest coordinates of the points that are known; `None` for none.
@@ -105,6 +116,7 @@ mod tests {
         assert!(cross(diagonal, segment((0.0, 2.0), (2.0, 0.0))));
         assert!(!cross(diagonal, segment((0.0, 2.0), (0.9, 1.1))));
         assert!(!cross(diagonal, segment((3.0, 0.0), (3.0, 9.0))));
+        assert!(!cross(segment((0.1, 0.3), (0.7, 2.1)), segment((1.1, 3.3), (1.9, 5.7))));
         assert!(!cross(diagonal, (O, Point::UNKNOWN)));
     }
 

@@ -14,6 +14,7 @@
 //! assert_eq!(layout.points()[..3], before);
 //! ```
 
+mod barycentres;
 mod comfort;
 mod conflicts;
 mod drawing;
@@ -22,6 +23,7 @@ mod geometry;
 mod graph;
 mod placement;
 mod redrawing;
+mod reduction;
 mod smoothing;
 mod triangulation;
 mod untangling;
@@ -68,15 +70,21 @@ impl Layout {
         self.graph = graph;
         self.points.resize(self.graph.vertices(), Point::UNKNOWN);
         let before = self.points.clone();
+        let is_blank = !before.iter().any(|point| point.is_known());
+        if is_blank && before.len() > 2 {
+            self.points = redrawing::redraw(&self.graph, &before);
+            return;
+        }
         self.place_new();
         let left = untangling::untangle(&self.graph, &mut self.points);
         if left == 0 {
             return;
         }
         let points = redrawing::redraw(&self.graph, &before);
-        // Where crossings cannot be helped, few of them do not make up for a picture that jumps.
         let redrawn = conflicts::conflicts(&self.graph, &points);
-        if redrawn == 0 || 2 * redrawn < left {
+        // Where crossings cannot be helped, a few less do not make up for a picture that jumps.
+        let is_worth_it = redrawn == 0 || 2 * redrawn < left || left > conflicts::crossings(&self.graph, &self.points);
+        if redrawn < left && is_worth_it {
             self.points = points;
         }
     }
@@ -107,7 +115,6 @@ impl Layout {
 
     /// Places the vertices that have no position, those with most neighbours in the picture first.
     fn place_new(&mut self) {
-        let mut new = Vec::new();
         loop {
             let graph = &self.graph;
             let known = |vertex: usize| {
@@ -116,10 +123,7 @@ impl Layout {
             let waiting = (0..self.points.len()).rev().filter(|&vertex| !self.points[vertex].is_known());
             let Some(vertex) = waiting.max_by_key(|&vertex| known(vertex)) else { break };
             self.points[vertex] = placement::place(graph, &self.points, vertex);
-            new.push(vertex);
         }
-        let nowhere = vec![Point::UNKNOWN; self.points.len()];
-        smoothing::smooth(&self.graph, &mut self.points, &new, &nowhere, 20);
     }
 }
 

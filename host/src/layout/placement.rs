@@ -18,17 +18,50 @@ pub(super) fn place(graph: &Graph, points: &[Point], vertex: usize) -> Point {
     let is_alone = !graph.neighbours(vertex).iter().any(|&neighbour| points[neighbour].is_known());
     let cost = |at: Point| {
         let far = if is_alone { TO_THE_MIDDLE * (at - middle).squared() } else { 0.0 };
-        (conflicts_of(graph, points, vertex, at), discomfort_of(graph, points, vertex, at) + far)
+        discomfort_of(graph, points, vertex, at, f64::INFINITY) + far
     };
-    let close = if is_alone { None } else { best(around_neighbours(graph, points, vertex), cost) };
+    let search = Search { graph, points, vertex, cost };
+    let close = if is_alone { None } else { search.best(around_neighbours(graph, points, vertex), None) };
     match close {
-        Some((at, (0, _))) => at,
+        Some(close) if close.conflicts == 0 => close.at,
         // An edge of more than 1 is better than one that crosses.
-        close => {
-            let anywhere = best(over_the_picture(points), cost);
-            let better = close.into_iter().chain(anywhere).min_by(|one, other| compare(&one.1, &other.1));
-            better.map_or(middle, |(at, _)| at)
+        close => search.best(over_the_picture(points), close).map_or(middle, |found| found.at),
+    }
+}
+
+/// A search for the best position of a vertex.
+pub(super) struct Search<'picture, COST> {
+    pub(super) graph: &'picture Graph,
+    pub(super) points: &'picture [Point],
+    pub(super) vertex: usize,
+    /// What decides between positions with as many conflicts.
+    pub(super) cost: COST,
+}
+
+/// A position and what it would bring.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Found {
+    pub(super) at: Point,
+    pub(super) conflicts: u32,
+    pub(super) cost: f64,
+}
+
+impl<COST: Fn(Point) -> f64> Search<'_, COST> {
+    /// The best of some positions and one found before: that with the fewest conflicts, and of those the one with the least cost.
+    pub(super) fn best(&self, candidates: impl Iterator<Item = Point>, before: Option<Found>) -> Option<Found> {
+        let mut best = before;
+        for at in candidates {
+            let limit = best.map_or(u32::MAX, |best| best.conflicts);
+            let conflicts = conflicts_of(self.graph, self.points, self.vertex, at, limit);
+            if conflicts > limit {
+                continue;
+            }
+            let cost = (self.cost)(at);
+            if best.is_none_or(|best| conflicts < best.conflicts || cost < best.cost) {
+                best = Some(Found { at, conflicts, cost });
+            }
         }
+        best
     }
 }
 
@@ -56,17 +89,4 @@ pub(super) fn over_the_picture(points: &[Point]) -> impl Iterator<Item = Point> 
     (0..rows).flat_map(move |row| {
         (0..columns).map(move |column| low + Point::new(at(column, columns, size.x), at(row, rows, size.y)))
     })
-}
-
-/// The candidate of the lowest cost, the first of several.
-pub(super) fn best(
-    candidates: impl Iterator<Item = Point>,
-    cost: impl Fn(Point) -> (u32, f64),
-) -> Option<(Point, (u32, f64))> {
-    candidates.map(|at| (at, cost(at))).min_by(|one, other| compare(&one.1, &other.1))
-}
-
-/// Conflicts first.
-fn compare(one: &(u32, f64), other: &(u32, f64)) -> std::cmp::Ordering {
-    one.0.cmp(&other.0).then(one.1.total_cmp(&other.1))
 }

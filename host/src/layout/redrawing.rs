@@ -1,41 +1,53 @@
 //! A picture from scratch: without crossings where the graph allows that, and as much like the picture before as it can be.
 
 use super::{
-    Point, conflicts, drawing, geometry, graph::Graph, smoothing::smooth, triangulation::Triangulation,
+    Point, barycentres,
+    conflicts::{conflicts, conflicts_of, growth},
+    drawing, geometry,
+    graph::Graph,
+    placement::place,
+    reduction::Reduction,
+    smoothing::smooth,
+    triangulation::Triangulation,
     untangling::untangle,
 };
 
-/// Sweeps of smoothing, before and after the picture is laid over the one before.
-const SWEEPS: usize = 30;
+/// Sweeps of smoothing of a drawing, and again when it is laid over the picture before.
+const SWEEPS: u32 = 16;
+
+/// A picture that has to grow by more than this, so that nothing hides anything, is drawn in another way.
+const TOO_SMALL: f64 = 2.0;
+
+/// A picture with crossings grows by this at most.
+const MOST_GROWTH: f64 = 4.0;
 
 /// Draws the whole graph; `before` are the positions to be kept where possible.
 ///
 /// A planar graph is drawn without any conflict, any other without those edges that make it so, which then cross some.
 pub(super) fn redraw(graph: &Graph, before: &[Point]) -> Vec<Point> {
-    let vertices = graph.vertices();
-    if vertices < 3 {
-        return (0..vertices).map(|vertex| Point::new(vertex as f64, 0.0)).collect();
-    }
-    let mut points = planar_part(graph);
-    let growth = conflicts::growth(graph, &points).min(vertices as f64 * 4.0);
-    points.iter_mut().for_each(|point| *point = *point * growth);
-    let all: Vec<usize> = (0..vertices).collect();
-    let nowhere = vec![Point::UNKNOWN; vertices];
-    smooth(graph, &mut points, &all, &nowhere, SWEEPS);
+    let all: Vec<usize> = (0..graph.vertices()).collect();
+    let nowhere = vec![Point::UNKNOWN; all.len()];
+    let is_planar = Triangulation::of(graph).is_some();
+    let mut points = if is_planar {
+        draw(graph)
+    } else {
+        let mut points = draw(&planar_part(graph));
+        untangle(graph, &mut points);
+        smooth(graph, &mut points, &all, &nowhere, SWEEPS);
+        let growth = growth(graph, &points).min(MOST_GROWTH);
+        scale(&mut points, growth);
+        points
+    };
     if before.iter().any(|point| point.is_known()) {
         lay_over(&mut points, before);
         smooth(graph, &mut points, &all, before, SWEEPS);
         put_back(graph, &mut points, before);
     }
-    untangle(graph, &mut points);
     points
 }
 
-/// The drawing of a planar part of the graph that no edge can be added to.
-fn planar_part(graph: &Graph) -> Vec<Point> {
-    if let Some(triangulation) = Triangulation::of(graph) {
-        return drawing::draw(&triangulation);
-    }
+/// As many edges as fit without crossings.
+fn planar_part(graph: &Graph) -> Graph {
     let mut part = Graph::new(graph.vertices());
     for &(a, b) in graph.edges() {
         part.connect(a, b);
@@ -43,7 +55,70 @@ fn planar_part(graph: &Graph) -> Vec<Point> {
             part.disconnect_last();
         }
     }
-    Triangulation::of(&part).map_or_else(Vec::new, |triangulation| drawing::draw(&triangulation))
+    part
+}
+
+/// A picture of a planar graph without conflicts.
+///
+/// What is drawn without trees and bends looks best, but may leave no room for them; the last way always works.
+fn draw(graph: &Graph) -> Vec<Point> {
+    let ways: [(fn(&Graph) -> Reduction, fn(&Triangulation) -> Vec<Point>); 3] =
+        [(Reduction::of, barycentres::draw), (Reduction::none, barycentres::draw), (Reduction::none, drawing::draw)];
+    let mut best: Option<(f64, Vec<Point>)> = None;
+    for (reduce, positions) in ways {
+        let drawn = draw_in_one_way(graph, &reduce(graph), positions);
+        if let Some((growth, points)) = drawn
+            && best.as_ref().is_none_or(|(least, _)| growth < *least)
+        {
+            let is_good = growth < TOO_SMALL;
+            best = Some((growth, points));
+            if is_good {
+                break;
+            }
+        }
+    }
+    best.map_or_else(Vec::new, |(_, points)| points)
+}
+
+/// A picture without conflicts, and by how much it had to grow for that; `None` when there is no room, or it is no planar graph.
+fn draw_in_one_way(
+    graph: &Graph,
+    reduction: &Reduction,
+    positions: fn(&Triangulation) -> Vec<Point>,
+) -> Option<(f64, Vec<Point>)> {
+    let mut points = vec![Point::UNKNOWN; graph.vertices()];
+    if !reduction.kept.is_empty() {
+        let kept = positions(&Triangulation::of(&reduction.graph)?);
+        reduction.kept.iter().zip(kept).for_each(|(&vertex, at)| points[vertex] = at);
+    }
+    for &(bend, (one, other)) in reduction.bends.iter().rev() {
+        points[bend] = (points[one] + points[other]) * 0.5;
+    }
+    // Its edges are about as long as they should be, and what is too close then comes apart; the rest of it by growth.
+    let length = mean_length(graph, &points);
+    scale(&mut points, 1.0 / length);
+    let drawn: Vec<usize> = (0..points.len()).filter(|&vertex| points[vertex].is_known()).collect();
+    let nowhere = vec![Point::UNKNOWN; points.len()];
+    smooth(graph, &mut points, &drawn, &nowhere, SWEEPS);
+    let growth = growth(graph, &points);
+    scale(&mut points, growth);
+    for &leaf in reduction.leaves.iter().rev() {
+        points[leaf] = place(graph, &points, leaf);
+    }
+    (growth.is_finite() && conflicts(graph, &points) == 0).then_some((growth, points))
+}
+
+fn scale(points: &mut [Point], factor: f64) {
+    points.iter_mut().for_each(|point| *point = *point * factor);
+}
+
+/// The mean length of the edges; 1 when there are none.
+fn mean_length(graph: &Graph, points: &[Point]) -> f64 {
+    let lengths = graph.edges().iter().map(|&(a, b)| (points[a] - points[b]).length());
+    let (sum, count) = lengths
+        .filter(|length| length.is_finite())
+        .fold((0.0, 0.0), |(sum, count), length| (sum + length, count + 1.0));
+    if count == 0.0 { 1.0 } else { sum / count }
 }
 
 /// Turns, mirrors and shifts a picture so that it lies as well as possible over the one before.
@@ -75,11 +150,11 @@ fn put_back(graph: &Graph, points: &mut [Point], before: &[Point]) {
         let mut moved = false;
         for vertex in 0..points.len() {
             let (now, then) = (points[vertex], before[vertex]);
-            if then.is_known()
-                && now != then
-                && conflicts::conflicts_of(graph, points, vertex, then)
-                    <= conflicts::conflicts_of(graph, points, vertex, now)
-            {
+            if !then.is_known() || now == then {
+                continue;
+            }
+            let conflicts = conflicts_of(graph, points, vertex, now, u32::MAX);
+            if conflicts_of(graph, points, vertex, then, conflicts) <= conflicts {
                 points[vertex] = then;
                 moved = true;
             }

@@ -1,76 +1,94 @@
 //! A picture made more pleasant step by step, without a conflict more than it has.
 
-use super::{Point, comfort::discomfort_of, conflicts::conflicts_of, geometry, graph::Graph};
+use super::{
+    Point,
+    comfort::discomfort_of,
+    conflicts::{conflicts_of, crossings_of},
+    geometry,
+    graph::Graph,
+};
 
 /// How strongly a vertex is drawn to its anchor.
 const ANCHOR_WEIGHT: f64 = 0.5;
 
-/// When no vertex moves by more than this in a sweep, the picture is done.
-const AT_REST: f64 = 0.02;
+/// The first steps are this long, the last this short.
+const FIRST_STEP: f64 = 0.5;
+const LAST_STEP: f64 = 0.03;
 
-/// Moves some vertices to where they are more comfortable, sweep by sweep.
+/// Moves some vertices to where they are more comfortable, sweep by sweep, until they rest.
 ///
 /// A vertex whose `anchors` position is known is drawn there. Cost of a sweep: O(movable · (vertices + edges) · degree).
-pub(super) fn smooth(graph: &Graph, points: &mut [Point], movable: &[usize], anchors: &[Point], sweeps: usize) {
-    let mut steps = vec![0.5; points.len()];
-    for _ in 0..sweeps {
-        let mut farthest: f64 = 0.0;
+pub(super) fn smooth(graph: &Graph, points: &mut [Point], movable: &[usize], anchors: &[Point], sweeps: u32) {
+    let mut steps = vec![FIRST_STEP; points.len()];
+    for sweep in 0..sweeps {
+        let mut rest = true;
         for &vertex in movable {
-            let moved = step(graph, points, vertex, anchors[vertex], &mut steps[vertex]);
-            farthest = farthest.max(moved).max(if moved > 0.0 { 0.0 } else { steps[vertex].min(AT_REST) });
+            if steps[vertex] < LAST_STEP {
+                continue;
+            }
+            rest = false;
+            match step(graph, points, vertex, anchors[vertex], steps[vertex], sweep) {
+                Some(at) => {
+                    points[vertex] = at;
+                    // Its neighbours may be more comfortable elsewhere now.
+                    let woken = |step: f64| step.max(2.0 * LAST_STEP);
+                    graph.neighbours(vertex).iter().for_each(|&neighbour| steps[neighbour] = woken(steps[neighbour]));
+                }
+                None => steps[vertex] *= 0.5,
+            }
         }
-        if farthest <= AT_REST {
+        if rest {
             return;
         }
     }
 }
 
-/// Moves one vertex if that helps; gives how far.
-fn step(graph: &Graph, points: &mut [Point], vertex: usize, anchor: Point, length: &mut f64) -> f64 {
+/// Where a vertex is more comfortable than where it is.
+fn step(graph: &Graph, points: &[Point], vertex: usize, anchor: Point, length: f64, sweep: u32) -> Option<Point> {
     let here = points[vertex];
-    let cost = |at: Point| {
-        let away = (at - anchor).squared();
-        discomfort_of(graph, points, vertex, at) + if anchor.is_known() { ANCHOR_WEIGHT * away } else { 0.0 }
+    let cost = |at: Point, limit: f64| {
+        let away = if anchor.is_known() { ANCHOR_WEIGHT * (at - anchor).squared() } else { 0.0 };
+        away + discomfort_of(graph, points, vertex, at, limit - away)
     };
-    let cost_here = cost(here);
-    let mut better: Vec<(f64, Point)> = Vec::new();
-    for at in candidates(graph, points, vertex, anchor, *length) {
-        let cost = cost(at);
-        if cost < cost_here - 1e-9 {
-            better.push((cost, at));
+    let mut least = cost(here, f64::INFINITY) - 1e-6;
+    let (mut crossings, mut conflicts) = (None, None);
+    let mut best = None;
+    for at in candidates(graph, points, vertex, anchor, length, sweep) {
+        let cost = cost(at, least);
+        if cost >= least {
+            continue;
+        }
+        let crossings = *crossings.get_or_insert_with(|| crossings_of(graph, points, vertex, here, u32::MAX));
+        let conflicts = *conflicts.get_or_insert_with(|| conflicts_of(graph, points, vertex, here, u32::MAX));
+        if crossings_of(graph, points, vertex, at, crossings) <= crossings
+            && conflicts_of(graph, points, vertex, at, conflicts) <= conflicts
+        {
+            (least, best) = (cost, Some(at));
         }
     }
-    better.sort_by(|one, other| one.0.total_cmp(&other.0));
-    if better.is_empty() {
-        *length *= 0.5;
-        return 0.0;
-    }
-    let conflicts = conflicts_of(graph, points, vertex, here);
-    let chosen = better.iter().find(|(_, at)| conflicts_of(graph, points, vertex, *at) <= conflicts);
-    let Some(&(_, at)) = chosen else {
-        *length *= 0.5;
-        return 0.0;
-    };
-    points[vertex] = at;
-    (at - here).length()
+    best
 }
 
-/// Ways towards the anchor and towards the neighbours, and short ways in all directions.
+/// Ways towards the anchor and towards the neighbours, and short ways in four directions, others in every second sweep.
 fn candidates(
     graph: &Graph,
     points: &[Point],
     vertex: usize,
     anchor: Point,
     length: f64,
+    sweep: u32,
 ) -> impl Iterator<Item = Point> {
     let here = points[vertex];
     let near = geometry::mean(graph.neighbours(vertex).iter().map(|&neighbour| {
         let away = here - points[neighbour];
         points[neighbour] + away * (1.0 / away.length().max(1e-9))
     }));
-    let near = if graph.neighbours(vertex).is_empty() { here } else { near };
+    let near = if graph.neighbours(vertex).is_empty() { Point::UNKNOWN } else { near };
     let goals = [anchor, near].into_iter().filter(|goal| goal.is_known());
-    let ways = goals.flat_map(move |goal| [1.0, 0.5, 0.25].map(|share| here + (goal - here) * share));
-    let around = (0..8).map(move |direction| here + Point::towards(f64::from(direction) * 0.785_398) * length);
+    let ways = goals.flat_map(move |goal| [1.0, 0.5, 0.2].map(|share| here + (goal - here) * share));
+    let around = (0..4).map(move |quarter| {
+        let eighth = f64::from(2 * quarter + sweep % 2);
+        here + Point::towards(eighth * std::f64::consts::FRAC_PI_4) * length
+    });
     ways.chain(around)
 }

@@ -4,6 +4,7 @@ use std::collections::BTreeSet;
 
 use rand::{RngExt, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
+use toposlam::wire::{List, Renamed};
 
 use super::{Layout, Point, conflicts, graph::Graph};
 use crate::topology::{TopologicalMap, Vertex};
@@ -114,6 +115,12 @@ fn a_planar_map_that_comes_at_once_is_drawn_without_conflicts() {
     }
 }
 
+/// What a map is without its last vertices.
+fn first_vertices(map: &TopologicalMap, count: usize) -> TopologicalMap {
+    let edges = map.edges.iter().copied().filter(|&(a, b)| usize::from(a.max(b)) < count);
+    self::map(count as u8, edges)
+}
+
 #[test]
 fn a_planar_map_that_grows_is_drawn_without_conflicts_at_every_step() {
     for (seed, sample) in (0..).zip(samples().iter().filter(|map| map.vertices.len() <= 30)) {
@@ -121,6 +128,123 @@ fn a_planar_map_that_grows_is_drawn_without_conflicts_at_every_step() {
         for map in explored(sample, &mut rng(seed)) {
             layout.arrange(&map);
             assert!(is_sound(&map, layout.points()), "{map:?} {:?}", layout.points());
+        }
+    }
+}
+
+#[test]
+fn a_vertex_keeps_its_position_when_nothing_of_the_old_picture_conflicts() {
+    let (mut updates, mut moved) = (0, 0);
+    for (seed, sample) in (0..).zip(samples().iter().filter(|map| map.vertices.len() <= 16)) {
+        let mut layout = Layout::new();
+        for map in explored(sample, &mut rng(seed)) {
+            let before = layout.points().to_vec();
+            layout.arrange(&map);
+            if is_sound(&first_vertices(&map, before.len()), &before) {
+                updates += 1;
+                moved += usize::from(before != layout.points()[..before.len()]);
+            }
+        }
+    }
+    // A vertex between several others may find no room, in rare cases.
+    assert!(updates > 200 && 50 * moved <= updates, "{moved} of {updates}");
+}
+
+#[test]
+fn a_map_that_loses_edges_and_vertices_or_comes_again_keeps_its_picture() {
+    let sample = random_planar(16, 24, &mut rng(3));
+    let mut layout = Layout::new();
+    layout.arrange(&sample);
+    let points = layout.points().to_vec();
+    layout.arrange(&sample);
+    assert_eq!(layout.points(), points);
+    let mut less = sample.clone();
+    less.edges.retain(|&(a, b)| (a + b) % 3 > 0);
+    less.edges.push((4, 4));
+    layout.arrange(&less);
+    assert_eq!(layout.points(), points);
+    layout.arrange(&first_vertices(&less, 12));
+    assert_eq!(layout.points(), &points[..12]);
+    layout.arrange(&map(0, []));
+    assert!(layout.points().is_empty());
+}
+
+#[test]
+fn a_vertex_with_another_number_keeps_its_position() {
+    let mut layout = Layout::new();
+    layout.arrange(&map(5, [(0, 1), (1, 2), (2, 3), (3, 4)]));
+    let points = layout.points().to_vec();
+    // 1 is gone, 3 and 4 are one.
+    layout.rename(&Renamed { place_index: 7, names: List::new([2, u8::MAX, 0, 1, 1]) });
+    layout.arrange(&map(4, [(0, 1), (0, 2), (2, 3)]));
+    assert_eq!(layout.points()[..3], [points[2], points[3], points[0]]);
+    assert!(is_sound(&map(4, [(0, 1), (0, 2), (2, 3)]), layout.points()));
+}
+
+#[test]
+fn merges_at_random_leave_no_conflicts() {
+    let mut rng = rng(5);
+    for _ in 0..20 {
+        let mut map = random_tree(14, &mut rng);
+        let mut layout = Layout::new();
+        layout.arrange(&map);
+        while map.vertices.len() > 3 {
+            // A leaf and its parent become one, which leaves a tree a tree.
+            let last = map.vertices.len() as u8 - 1;
+            let gone = (0..=last).find(|&vertex| map.neighbours()[usize::from(vertex)].len() == 1).unwrap();
+            let parent = map.neighbours()[usize::from(gone)][0] as u8;
+            let name = |vertex: u8| if vertex > gone { vertex - 1 } else { vertex };
+            let names = (0..=last).map(|vertex| name(if vertex == gone { parent } else { vertex }));
+            let edges = map.edges.iter().filter(|&&(a, b)| a != gone && b != gone);
+            let edges: Vec<_> = edges.map(|&(a, b)| (name(a), name(b))).collect();
+            layout.rename(&Renamed { place_index: 0, names: List::new(names) });
+            map = self::map(last, edges);
+            layout.arrange(&map);
+            assert!(is_sound(&map, layout.points()), "{map:?}");
+        }
+    }
+}
+
+#[test]
+fn the_same_maps_give_the_same_picture() {
+    let maps = explored(&random_planar(16, 22, &mut rng(9)), &mut rng(9));
+    let picture = || {
+        let mut layout = Layout::new();
+        maps.iter().for_each(|map| layout.arrange(map));
+        layout.points().to_vec()
+    };
+    assert_eq!(picture(), picture());
+}
+
+#[test]
+fn edges_are_about_as_long_as_they_should_be() {
+    for (seed, sample) in [(0, grid(4, 4)), (1, grid(4, 3)), (2, wheel(7)), (3, random_tree(16, &mut rng(4)))] {
+        let mut layout = Layout::new();
+        let maps = explored(&sample, &mut rng(seed));
+        maps.iter().for_each(|map| layout.arrange(map));
+        let graph = Graph::of(&maps[maps.len() - 1]);
+        let length = |&(a, b): &(usize, usize)| (layout.points()[a] - layout.points()[b]).length();
+        let mean = graph.edges().iter().map(length).sum::<f64>() / graph.edges().len() as f64;
+        assert!((0.7..2.5).contains(&mean), "{mean} {sample:?}");
+    }
+}
+
+#[test]
+fn a_map_that_is_not_planar_has_few_crossings_and_hides_nothing() {
+    let complete = |vertices: u8| map(vertices, (0..vertices).flat_map(|a| (0..a).map(move |b| (b, a))));
+    let petersen = map(10, (0..5).flat_map(|i| [(i, (i + 1) % 5), (i, i + 5), (i + 5, 5 + (i + 2) % 5)]));
+    let houses_and_wells = map(6, (0..3).flat_map(|house| (3..6).map(move |well| (house, well))));
+    for (map, fewest) in [(complete(5), 1), (complete(6), 3), (petersen, 2), (houses_and_wells, 1)] {
+        let mut at_once = Layout::new();
+        at_once.arrange(&map);
+        let mut grown = Layout::new();
+        let maps = explored(&map, &mut rng(2));
+        maps.iter().for_each(|map| grown.arrange(map));
+        for (map, layout) in [(&map, at_once), (&maps[maps.len() - 1], grown)] {
+            let graph = Graph::of(map);
+            let crossings = conflicts::crossings(&graph, layout.points());
+            assert!((fewest..=3 * fewest).contains(&crossings), "{crossings}, not {fewest}");
+            assert_eq!(conflicts::conflicts(&graph, layout.points()), crossings);
         }
     }
 }

@@ -8,27 +8,33 @@ use super::{embedding, graph::Graph};
 pub(super) struct Triangulation {
     /// The graph and the edges that were added to it.
     pub(super) graph: Graph,
-    /// The outer face.
+    /// The face with the most edges, before it was cut.
+    pub(super) rim: Vec<usize>,
+    /// The outer face, a piece of that.
     pub(super) outer: [usize; 3],
     /// For each edge and way the third vertex of the triangle on the side of that way.
     third: HashMap<(usize, usize), usize>,
 }
 
 impl Triangulation {
-    /// Of a graph of at least three vertices; `None` when it cannot be drawn without crossings.
+    /// `None` when the graph cannot be drawn without crossings, or has less than three vertices.
     ///
     /// One triangle of the face with the most edges is the outer one.
     pub(super) fn of(graph: &Graph) -> Option<Self> {
+        if graph.vertices() < 3 {
+            return None;
+        }
         let mut graph = biconnected(graph);
         let mut faces = embedding::faces(&graph)?;
         faces.sort_by_key(|face| std::cmp::Reverse(face.len()));
+        let rim = faces.first()?.clone();
         let mut triangles = Vec::new();
         for face in faces {
             cut(&mut graph, face, &mut triangles);
         }
         let outer = *triangles.first()?;
         let sides = |[a, b, c]: [usize; 3]| [((a, b), c), ((b, c), a), ((c, a), b)];
-        Some(Self { graph, outer, third: triangles.into_iter().flat_map(sides).collect() })
+        Some(Self { graph, rim, outer, third: triangles.into_iter().flat_map(sides).collect() })
     }
 
     /// The third vertex of the triangle that has this edge this way round.

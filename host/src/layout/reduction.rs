@@ -1,0 +1,80 @@
+//! What of a graph decides whether and how it can be drawn without crossings: neither its trees, nor the bends of its ways.
+
+use super::graph::Graph;
+
+/// A graph without its leaves, their twigs and so on, and with ways of several edges made one.
+pub(super) struct Reduction {
+    /// What is left; vertex `n` of it is `kept[n]`.
+    pub(super) graph: Graph,
+    pub(super) kept: Vec<usize>,
+    /// The vertices of the trees, the outermost first.
+    pub(super) leaves: Vec<usize>,
+    /// The vertices on the ways, each with the two that it was between when it was taken out.
+    pub(super) bends: Vec<(usize, (usize, usize))>,
+}
+
+impl Reduction {
+    pub(super) fn of(graph: &Graph) -> Self {
+        let mut neighbours: Vec<Vec<usize>> =
+            (0..graph.vertices()).map(|vertex| graph.neighbours(vertex).to_vec()).collect();
+        let mut is_kept = vec![true; graph.vertices()];
+        let (mut leaves, mut bends) = (Vec::new(), Vec::new());
+        while let Some(leaf) = (0..is_kept.len()).find(|&vertex| is_kept[vertex] && neighbours[vertex].len() < 2) {
+            is_kept[leaf] = false;
+            leaves.push(leaf);
+            if let Some(stem) = neighbours[leaf].pop() {
+                neighbours[stem].retain(|&other| other != leaf);
+            }
+        }
+        let is_bend = |neighbours: &[Vec<usize>], vertex: usize| match neighbours[vertex][..] {
+            [one, other] => !neighbours[one].contains(&other),
+            _ => false,
+        };
+        while let Some(bend) = (0..is_kept.len()).find(|&vertex| is_kept[vertex] && is_bend(&neighbours, vertex)) {
+            let (one, other) = (neighbours[bend][0], neighbours[bend][1]);
+            is_kept[bend] = false;
+            bends.push((bend, (one, other)));
+            for (from, to) in [(one, other), (other, one)] {
+                neighbours[from].iter_mut().filter(|next| **next == bend).for_each(|next| *next = to);
+            }
+        }
+        let kept: Vec<usize> = (0..is_kept.len()).filter(|&vertex| is_kept[vertex]).collect();
+        let mut reduced = Graph::new(kept.len());
+        for (vertex, &original) in kept.iter().enumerate() {
+            for &other in &neighbours[original] {
+                if let Ok(other) = kept.binary_search(&other) {
+                    reduced.connect(vertex, other);
+                }
+            }
+        }
+        Self { graph: reduced, kept, leaves, bends }
+    }
+
+    /// Nothing taken out.
+    pub(super) fn none(graph: &Graph) -> Self {
+        Self { graph: graph.clone(), kept: (0..graph.vertices()).collect(), leaves: Vec::new(), bends: Vec::new() }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_house_with_a_garden_path_is_a_triangle() {
+        let mut graph = Graph::new(7);
+        [(0, 1), (1, 2), (2, 3), (3, 4), (4, 0), (2, 5), (5, 6)].into_iter().for_each(|(a, b)| graph.connect(a, b));
+        let reduction = Reduction::of(&graph);
+        assert_eq!((reduction.graph.vertices(), reduction.graph.edges().len()), (3, 3));
+        assert_eq!(reduction.leaves, [6, 5]);
+        assert_eq!(reduction.bends, [(0, (1, 4)), (1, (4, 2))]);
+        assert_eq!(reduction.kept, [2, 3, 4]);
+    }
+
+    #[test]
+    fn a_tree_is_nothing_but_leaves() {
+        let mut graph = Graph::new(4);
+        [(0, 1), (1, 2), (1, 3)].into_iter().for_each(|(a, b)| graph.connect(a, b));
+        assert_eq!(Reduction::of(&graph).leaves.len(), 4);
+    }
+}
