@@ -144,7 +144,9 @@ def _optional(codec: _Codec) -> _Codec:
     def read(payload: bytes, at: int) -> tuple[Any, int]:
         if payload[at] > 1:
             raise _UnknownPayload
-        return codec.read(payload, at + 1) if payload[at] else (None, at + 1)
+        if payload[at]:
+            return codec.read(payload, at + 1)
+        return None, at + 1
 
     def write(value: Any, out: bytearray) -> None:
         out.append(value is not None)
@@ -1043,8 +1045,9 @@ class Picture:
         if self.belief:
             self.belief = self.belief._renamed(renamed)
         if self.worst:
-            walk = tuple(renamed.now(vertex) for vertex in self.worst.vertices)
-            self.worst = None if None in walk else dataclasses.replace(self.worst, vertices=walk)
+            walk = self.worst.vertices
+            now = tuple(vertex for vertex in map(renamed.now, walk) if vertex is not None)
+            self.worst = dataclasses.replace(self.worst, vertices=now) if len(now) == len(walk) else None
 
 
 def _with_vertex(message: Any, vertex: Optional[int]) -> Any:

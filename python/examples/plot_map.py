@@ -1,4 +1,4 @@
-"""Plots the map of a robot as it grows, where the robot is, and what its sonars say.
+"""Plots the map of a robot as it grows, where the robot is, what its sonars say and where it steers.
 
     pip install './python[plot]'
     python python/examples/plot_map.py tcp:127.0.0.1:7070
@@ -17,7 +17,7 @@ from pathlib import Path
 
 import matplotlib
 
-from toposlam_stream import Decoder, Event, Heard, Line, Picture, Renamed, Ring, open_line
+from toposlam_stream import DEAD, SILENCE, Decoder, Event, Heard, Line, Picture, Renamed, open_line
 
 SECONDS_A_PICTURE = 0.2
 SILENT_MM = 6000
@@ -73,27 +73,33 @@ def draw(figure, picture: Picture, arrangement: Arrangement, decoder: Decoder) -
         area = 120 + (row.radius_mm / 8 if row else 0)
         paper.scatter(point.real, point.imag, s=area, color="tab:red" if is_here else "tab:blue", zorder=2)
         paper.annotate(str(vertex), (point.real, point.imag), color="white", ha="center", va="center", zorder=3)
-    paper.set_aspect("equal")
+    paper.set_aspect("equal", adjustable="datalim")
     paper.margins(0.15)
     paper.set_axis_off()
-    state = "the robot's" if picture.is_converged() else "may lack things"
+    state = "as the robot has it" if picture.is_converged() else "it may lack things"
     paper.set_title(f"{picture.vertices} places, {len(picture.edges())} edges: {state}")
-    if picture.ring:
-        ring = figure.add_subplot(1, 2, 2, projection="polar")
-        draw_ring(ring, picture.ring)
+    draw_surroundings(figure.add_subplot(1, 2, 2, projection="polar"), picture)
     figure.suptitle(f"{decoder.counters.messages} messages, {decoder.counters.lost} lost (red: the robot is here)")
 
 
-def draw_ring(axes, ring: Ring) -> None:
-    """The ranges of sonars that stand evenly, counter-clockwise from straight ahead. A dead one is left out."""
-    sonars = [(number, echo) for number, echo in enumerate(ring.ranges_mm) if echo != "dead"]
-    bearings = [2 * math.pi * number / len(ring.ranges_mm) for number, _ in sonars]
-    ranges_mm = [SILENT_MM if echo == "silence" else min(echo, SILENT_MM) for _, echo in sonars]
+def draw_surroundings(axes, picture: Picture) -> None:
+    """The ranges of sonars that stand evenly, counter-clockwise from straight ahead, without the dead ones; and where the
+    drive steers."""
     axes.set_theta_zero_location("N")
     axes.set_rlim(0, SILENT_MM)
+    if picture.drive:
+        bearing = picture.drive.heading_mrad / 1000
+        axes.plot([bearing, bearing], [0, SILENT_MM * picture.drive.speed_permille / 1000], color="tab:red")
+    if picture.ring is None:
+        axes.set_title("the robot sends no ring frames; red: its drive")
+        return
+    echoes = picture.ring.ranges_mm
+    sonars = [(number, echo) for number, echo in enumerate(echoes) if echo != DEAD]
+    bearings = [2 * math.pi * number / len(echoes) for number, _ in sonars]
+    ranges_mm = [SILENT_MM if echo == SILENCE else min(echo, SILENT_MM) for _, echo in sonars]
     axes.fill(bearings, ranges_mm, alpha=0.3)
     axes.plot(bearings, ranges_mm, "o")
-    axes.set_title(f"ring frame {ring.frame_index}, mm")
+    axes.set_title(f"ring frame {picture.ring.frame_index}, mm; red: the drive")
 
 
 def listen(line: Line, decoder: Decoder, picture: Picture, arrangement: Arrangement) -> bool:

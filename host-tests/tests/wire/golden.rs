@@ -10,8 +10,9 @@ use toposlam::FaultKind;
 use toposlam::reference::SNAPSHOT_BYTES;
 use toposlam::ring::Echo;
 use toposlam::wire::{
-    Chunk, Command, DecoderCounters, Drive, Echoes, Encoder, Evidence, Hello, Info, Journey, JourneyState, List,
-    Message, Outcome, Picture, Refusal, Renamed, Reply, Request, ResetCause, Version, Worst, crc32,
+    Belief, Chunk, Command, DecoderCounters, Drive, Echoes, Encoder, Evidence, Hello, Info, Journey, JourneyState,
+    List, Location, Message, Outcome, Picture, PlaceProbability, Refusal, Renamed, Reply, Request, ResetCause, Version,
+    Worst, crc32,
 };
 use toposlam_host::exploration::Exploration;
 use toposlam_host::json;
@@ -64,6 +65,10 @@ fn records(exploration: &[Vec<u8>]) -> Vec<Value> {
     ));
     records.push(stream("one of every kind of damage", &every_damage()));
     records.push(stream("numbers that wrap", &wrapping()));
+    records.push(stream("lists that are too long", &long_lists()));
+    let renamed = renamed();
+    records.push(stream("a map that shrinks and is renamed", &renamed.concat()));
+    records.push(stream("two vertices become one", &renamed[..15].concat()));
     for seed in 0..24 {
         let mut draw = Draw(seed);
         let from = draw.below(exploration.len() - 24);
@@ -223,9 +228,24 @@ fn explore() -> Vec<Vec<u8>> {
     let (mut encoder, mut frames) = (Encoder::new(0), Vec::new());
     let mut listener = Listener::new();
     while exploration.places() < 12 || !listener.picture().is_converged() || !listener.picture().is_complete() {
-        let is_shown = exploration.advance().is_some() || exploration.frames() % 24 < 4;
-        for (_, message) in hear(&exploration.board().sent).messages {
-            if is_shown || frames.is_empty() || matches!(message, Message::Map { .. } | Message::Renamed(_)) {
+        exploration.board().sent.clear();
+        let ring = exploration.frame();
+        let is_place = exploration.map(&ring).is_some();
+        let suggestion = exploration.board().suggestion;
+        exploration.drive(suggestion);
+        let turn = exploration.frames();
+        let mut messages: Vec<Message> =
+            hear(&exploration.board().sent).messages.into_iter().map(|(_, message)| message).collect();
+        if turn % 400 == 0 {
+            // No board sends them; some may.
+            messages.push(Message::Ring { frame_index: turn as u32, echoes: Echoes::new(&ring.echoes) });
+        }
+        for message in messages {
+            let is_shown = match message {
+                Message::Drive(_) => turn % 400 == 0,
+                _ => is_place || turn % 32 < 2,
+            };
+            if is_shown || frames.is_empty() {
                 frames.push(frame(&mut encoder, &message));
                 listener.feed(&frames[frames.len() - 1], |_, _| ());
             }
@@ -300,8 +320,71 @@ fn every_damage() -> Vec<u8> {
 
 fn wrapping() -> Vec<u8> {
     let edge = Message::Edge { a: 0, b: 1, present: true };
-    let numbers = [65500, 65535, 0, 65535, 40, 65535, 32_807, 32_806, 32_743, 32_744, 65511, 65510, 32_742];
+    let numbers = [65500, 65535, 0, 65535, 40, 65535, 32_807, 32_806, 32_743, 32_744, 65511, 65510, 32_742, 65510];
     numbers.iter().flat_map(|&number| frame(&mut Encoder::new(number), &edge)).collect()
+}
+
+/// Each list with one element more than it can have, and a number of elements beyond all bounds.
+fn long_lists() -> Vec<u8> {
+    let list = |head: &[u8], count: u8, element: &[u8]| {
+        let body = [&[1, 0, 0], head, &[count], &element.repeat(count.into())].concat();
+        with_crc(&body)
+    };
+    [
+        list(&[10, 0], 33, &[5]),
+        list(&[11, 0, 0], 9, &[1, 1]),
+        list(&[12, 0], 65, &[1]),
+        list(&[13, 0, 0, 0], 8, &[1]),
+        list(&[14, 0, 2, 0, 0], 65, &[1]),
+        with_crc(&[1, 0, 0, 12, 0, 0xFF, 0xFF, 0xFF, 0xFF, 0xFF, 0xFF, 0xFF, 0xFF, 0xFF, 1]),
+        with_crc(&[1, 0, 0, 12, 0, 0xFF, 0xFF, 0xFF, 0xFF, 0xFF, 0xFF, 0xFF, 0xFF, 0xFF, 3]),
+        // A varint may be longer than it has to be, and names no value beyond its type.
+        with_crc(&[1, 0, 0, 12, 0x80, 0x80, 0, 0x81, 0, 7]),
+        with_crc(&[1, 1, 0, 12, 0xFF, 0xFF, 0xFF, 0xFF, 0x0F, 0]),
+        with_crc(&[1, 2, 0, 12, 0xFF, 0xFF, 0xFF, 0xFF, 0x1F, 0]),
+        with_crc(&[1, 2, 0, 12, 0x80, 0x80, 0x80, 0x80, 0x80, 0, 0]),
+    ]
+    .concat()
+}
+
+/// The frames of a small map, whose vertices get new numbers again and again.
+fn renamed() -> Vec<Vec<u8>> {
+    let canonical: [&[u8]; 3] =
+        [&[2], &[232, 3, 1, 0, 0, 0, 2, 0, 0, 0, 0, 0, 0, 0], &[232, 3, 1, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0]];
+    let map = Message::Map { vertices: 2, edges: 1, digest: crc32(&canonical.concat()) };
+    let vertex = |vertex| Message::Vertex { vertex, radius_mm: 1000, visits: 1 };
+    let names = |names: &[u8]| Message::Renamed(Renamed { place_index: 2, names: List::new(names.iter().copied()) });
+    let place = |(vertex, permille)| PlaceProbability { vertex, permille };
+    let messages = [
+        vertex(0),
+        vertex(1),
+        Message::Edge { a: 0, b: 1, present: true },
+        Message::Edge { a: 1, b: 5, present: true },
+        vertex(5),
+        map,
+        // What is gone does not come back with its number.
+        vertex(5),
+        map,
+        names(&[0, 1]),
+        map,
+        Message::Belief(Belief {
+            place_index: 2,
+            map_permille: 500,
+            places: List::new([(1, 600), (0, 300), (2, 70)].map(place)),
+        }),
+        Message::Location(Location { place_index: 2, vertex: 1 }),
+        Message::Journey(Journey { vertex: 0, state: JourneyState::Underway }),
+        Message::Worst(Worst { place_index: 2, distance_mm: 9, newest_age: 1, vertices: List::new([0, 1, 0]) }),
+        names(&[2, 2, 0]),
+        names(&[0, 1, 255, 4]),
+        names(&[]),
+        Message::Edge { a: 0, b: 3, present: true },
+        Message::Edge { a: 3, b: 3, present: true },
+        names(&[64, 1, 2, 63]),
+        names(&[200]),
+    ];
+    let mut encoder = Encoder::new(0);
+    messages.iter().map(|message| frame(&mut encoder, message)).collect()
 }
 
 /// Some bytes changed, left out, doubled or put in.
