@@ -212,7 +212,8 @@ def _choice(*classes: type) -> _Codec:
         kind, at = number.read(payload, at)
         if kind >= len(records):
             raise _UnknownPayload
-        return records[kind].read(payload, at)
+        record: _Codec = records[kind]
+        return record.read(payload, at)
 
     def write(value: Any, out: bytearray) -> None:
         if type(value) not in places:
@@ -1046,8 +1047,8 @@ class Picture:
             self.belief = self.belief._renamed(renamed)
         if self.worst:
             walk = self.worst.vertices
-            now = tuple(vertex for vertex in map(renamed.now, walk) if vertex is not None)
-            self.worst = dataclasses.replace(self.worst, vertices=now) if len(now) == len(walk) else None
+            kept = tuple(vertex for vertex in map(renamed.now, walk) if vertex is not None)
+            self.worst = dataclasses.replace(self.worst, vertices=kept) if len(kept) == len(walk) else None
 
 
 def _with_vertex(message: Any, vertex: Optional[int]) -> Any:
