@@ -4,6 +4,7 @@ mod commands;
 mod console;
 mod convergence;
 mod damage;
+mod golden;
 mod inbox;
 mod robot;
 mod samples;

@@ -1,0 +1,431 @@
+"""The decoder is held to the golden file that the Rust library writes: `python -m unittest discover python/tests`."""
+
+from __future__ import annotations
+
+import dataclasses
+import importlib.util
+import json
+import os
+import random
+import re
+import socket
+import subprocess
+import sys
+import tempfile
+import threading
+import unittest
+import zlib
+from pathlib import Path
+from typing import Any, Callable, Optional
+
+PYTHON = Path(__file__).resolve().parent.parent
+REPOSITORY = PYTHON.parent
+sys.path.insert(0, str(PYTHON))
+
+import toposlam_stream
+from toposlam_stream import (
+    Arrival,
+    Client,
+    Command,
+    Counters,
+    Damaged,
+    DecodeError,
+    Decoder,
+    Edge,
+    Encoder,
+    Heard,
+    Hello,
+    Journey,
+    JourneyState,
+    Line,
+    Map,
+    NoReply,
+    Outcome,
+    Picture,
+    Refusal,
+    Reply,
+    Request,
+    Ring,
+    Setting,
+    json_line,
+    open_line,
+    to_json,
+)
+
+RECORDS = [json.loads(line) for line in (REPOSITORY / "host-tests/golden/stream.jsonl").read_text().splitlines()]
+
+
+def of_kind(kind: str) -> list[dict[str, Any]]:
+    return [record for record in RECORDS if record["kind"] == kind]
+
+
+def exploration() -> bytes:
+    return bytes.fromhex(next(record["bytes"] for record in RECORDS if record.get("name") == "an exploration"))
+
+
+def feed_in_pieces(stream: bytes, piece_bytes: int) -> tuple[list[Any], Decoder]:
+    decoder = Decoder()
+    pieces = (stream[at : at + piece_bytes] for at in range(0, len(stream), piece_bytes))
+    return [event for piece in pieces for event in decoder.feed(piece)], decoder
+
+
+def picture_json(picture: Picture) -> dict[str, Any]:
+    named = ("hello", "location", "evidence", "health", "belief", "worst", "journey")
+    return {
+        "vertices": picture.vertices,
+        "rows": [plain(picture.row(vertex)) for vertex in range(picture.vertices)],
+        "edges": [list(edge) for edge in picture.edges()],
+        "is_converged": picture.is_converged(),
+        "is_complete": picture.is_complete(),
+        "faults": list(picture.faults.values()),
+        **{name: plain(getattr(picture, name)) for name in named},
+    }
+
+
+def plain(message: Any) -> Any:
+    if message is None:
+        return None
+    event = to_json(Heard(0, Arrival.FIRST, 0, message))
+    return {name: value for name, value in event.items() if name not in ("event", "sequence")}
+
+
+def needs(what: str, is_there: bool) -> Callable[[Any], Any]:
+    """Skips a test loudly without something that it needs; where nobody looks, it fails."""
+    if is_there:
+        return lambda test: test
+    print(f"SKIPPED: {what} is missing", file=sys.stderr)
+    if os.environ.get("CI") == "true":
+        return lambda test: lambda self: self.fail(f"{what} is missing")
+    return unittest.skip(f"{what} is missing")
+
+
+class Golden(unittest.TestCase):
+    def test_every_message_is_read_as_the_library_reads_it_and_packed_as_it_packs_it(self) -> None:
+        for record in of_kind("message"):
+            with self.subTest(record["event"]["event"], frame=record["frame"]):
+                frame = bytes.fromhex(record["frame"])
+                (event,) = Decoder().feed(frame)
+                self.assertEqual(to_json(event), record["event"])
+                self.assertEqual(Encoder(event.sequence).encode(event.message), frame)
+
+    def test_every_request_is_packed_as_the_library_packs_it(self) -> None:
+        for record in of_kind("request"):
+            with self.subTest(request=record["request"]):
+                frame = bytes.fromhex(record["frame"])
+                (event,) = Decoder(requests=True).feed(frame)
+                self.assertEqual(plain(event.message), record["request"])
+                self.assertEqual(Encoder(record["sequence"]).encode(event.message), frame)
+
+    def test_the_golden_file_holds_every_message_outcome_command_and_setting(self) -> None:
+        messages = {record["event"]["event"] for record in of_kind("message")}
+        self.assertEqual(messages, {of.__name__ for of in toposlam_stream.Message.__args__})
+
+        def names(values: Any) -> set[str]:
+            return {value if isinstance(value, str) else next(iter(value)) for value in values}
+
+        outcomes = names(record["event"]["outcome"] for record in of_kind("message") if record["event"]["event"] == "Reply")
+        self.assertEqual(outcomes, {of.__name__ for of in toposlam_stream.AnyOutcome.__args__})
+        commands = [record["request"]["command"] for record in of_kind("request")]
+        self.assertEqual(names(commands), {of.__name__ for of in toposlam_stream.AnyCommand.__args__})
+        settings = {next(iter(command["SetConfig"])) for command in commands if "SetConfig" in command}
+        self.assertEqual(len(settings), len(Setting))
+
+    def test_every_stream_gives_the_events_counts_and_map_that_the_library_has(self) -> None:
+        for record in of_kind("stream"):
+            with self.subTest(record["name"]):
+                decoder, picture = Decoder(), Picture()
+                lines, converged = [], 0
+                events = decoder.feed(bytes.fromhex(record["bytes"]))
+                for event in events:
+                    picture.apply(event)
+                    converged += picture.is_converged()
+                    lines.append(json_line(to_json(event)) + "\n")
+                self.assertEqual(dataclasses.asdict(decoder.counters), record["counters"])
+                self.assertEqual(len(events), record["events"])
+                self.assertEqual(zlib.crc32("".join(lines).encode()), record["events_crc32"])
+                self.assertEqual(converged, record["converged"])
+                self.assertEqual(picture_json(picture), record["picture"])
+
+    def test_it_does_not_matter_how_a_stream_is_split(self) -> None:
+        for record in of_kind("stream"):
+            stream = bytes.fromhex(record["bytes"])
+            whole, decoder = feed_in_pieces(stream, len(stream))
+            for piece_bytes in (1, 7, 113):
+                with self.subTest(record["name"], piece_bytes=piece_bytes):
+                    events, in_pieces = feed_in_pieces(stream, piece_bytes)
+                    self.assertEqual(events, whole)
+                    self.assertEqual(in_pieces.counters, decoder.counters)
+
+    def test_the_examples_and_the_versions_of_the_specification_are_met(self) -> None:
+        specification = (REPOSITORY / "docs/wire.md").read_text()
+        for version in (toposlam_stream.PROTOCOL_VERSION, toposlam_stream.FRAME_VERSION):
+            self.assertIn(f"version is {version}", specification)
+        self.assertIn(f"{toposlam_stream.SCHEMA_HASH:016X}", specification)
+        for kind, requests in (("example", False), ("request", True)):
+            blocks = re.findall(rf"```{kind}\n(.*?)```", specification, re.DOTALL)
+            self.assertEqual(len(blocks), 20)
+            for block in blocks:
+                frame = bytes.fromhex(re.search("frame: (.*)", block)[1])
+                (event,) = Decoder(requests).feed(frame)
+                self.assertIn(f"sequence: {event.sequence}\n", block)
+                self.assertEqual(Encoder(event.sequence).encode(event.message), frame)
+
+
+class Robustness(unittest.TestCase):
+    def test_no_bytes_make_the_decoder_the_picture_or_the_json_raise(self) -> None:
+        draw = random.Random(1)
+        intact = exploration()
+        for _ in range(300):
+            noise = draw.randbytes(draw.randrange(400))
+            at = draw.randrange(len(intact) - 600)
+            stream = bytearray(intact[at : at + 600])
+            for _ in range(draw.randrange(20)):
+                stream[draw.randrange(len(stream))] = draw.choice((0, 1, 2, 127, 128, 255))
+            decoder, picture = Decoder(), Picture()
+            for event in decoder.feed(noise + bytes(stream)):
+                picture.apply(event)
+                json_line(to_json(event))
+            self.assertLessEqual(picture.vertices, 64)
+
+    def test_an_intact_frame_of_any_payload_is_one_message_or_one_error(self) -> None:
+        draw = random.Random(2)
+        for version, head, requests in ((1, b"", False), (129, b"\7", True), (129, b"\7\7", True)):
+            heard = []
+            for _ in range(3000):
+                rest = bytes(draw.choice((0, 1, 2, 127, 128, 255)) for _ in range(draw.randrange(30)))
+                body = bytes([version, 0, 0]) + head + bytes([draw.randrange(18)]) + rest
+                raw = body + zlib.crc32(body).to_bytes(4, "little")
+                frame = b"".join(bytes([len(block) + 1]) + block for block in raw.split(b"\0")) + b"\0"
+                (event,) = Decoder(requests).feed(frame)
+                heard.append(type(event))
+            self.assertEqual(set(heard), {Heard, Damaged})
+
+    def test_bytes_without_an_end_are_not_kept(self) -> None:
+        decoder = Decoder()
+        for _ in range(100):
+            self.assertEqual(decoder.feed(b"\xff" * 10_000), [])
+            self.assertLess(len(decoder._begun), 200)
+        self.assertEqual(decoder.feed(b"\0"), [Damaged(DecodeError.TOO_LONG)])
+
+    def test_counts_stay_at_their_end(self) -> None:
+        decoder = Decoder()
+        decoder.counters.cut = 0xFFFF_FFFF
+        decoder.feed(b"\1\0")
+        self.assertEqual(decoder.counters, Counters(cut=0xFFFF_FFFF))
+
+    def test_what_is_out_of_its_range_is_not_packed_and_uses_up_no_number(self) -> None:
+        encoder = Encoder()
+        for command in (
+            Command.GoTo(256),
+            Command.GoTo(-1),
+            Command.SetConfig(Setting.NOISE_MM, 65_536),
+            Command.RestoreChunk(0, bytes(65)),
+        ):
+            with self.subTest(command), self.assertRaises(ValueError):
+                encoder.encode(Request(1, command))
+        with self.assertRaises(TypeError):
+            encoder.encode(Request(1, Outcome.Done()))
+        self.assertEqual(encoder.encode(Request(1, Command.Info())), Encoder(0).encode(Request(1, Command.Info())))
+
+
+class Understanding(unittest.TestCase):
+    def test_a_robot_of_another_version_or_with_other_messages_is_named(self) -> None:
+        hello = next(event.message for event in Decoder().feed(exploration()) if isinstance(event.message, Hello))
+        self.assertIsNone(hello.complaint())
+        newer = dataclasses.replace(hello, protocol_version=hello.protocol_version + 1, schema_hash=7)
+        self.assertIn("version 4, this program 3", newer.complaint())
+        other = dataclasses.replace(hello, schema_hash=7)
+        self.assertIn("not understood", other.complaint())
+        self.assertIn("0x0000000000000007", other.complaint())
+
+
+class Listeners:
+    """A TCP port that says some bytes to the first who connects, or answers."""
+
+    def __init__(self, serve: Callable[[socket.socket], None]) -> None:
+        self._server = socket.create_server(("127.0.0.1", 0))
+        self.name = f"tcp:127.0.0.1:{self._server.getsockname()[1]}"
+        self._thread = threading.Thread(target=self._run, args=(serve,), daemon=True)
+        self._thread.start()
+
+    def _run(self, serve: Callable[[socket.socket], None]) -> None:
+        connection, _ = self._server.accept()
+        with connection:
+            serve(connection)
+
+    def __enter__(self) -> Listeners:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._server.close()
+        self._thread.join(timeout=10)
+
+
+def script(*arguments: str) -> subprocess.CompletedProcess[str]:
+    environment = {**os.environ, "PYTHONPATH": str(PYTHON)}
+    return subprocess.run(
+        [sys.executable, *arguments], env=environment, capture_output=True, text=True, timeout=120, check=False
+    )
+
+
+class Lines(unittest.TestCase):
+    def test_the_command_prints_every_event_and_then_the_counts(self) -> None:
+        record = of_kind("stream")[1]
+        with Listeners(lambda connection: connection.sendall(bytes.fromhex(record["bytes"]))) as robot:
+            printed = script("-m", "toposlam_stream", robot.name)
+        self.assertEqual(printed.returncode, 0, printed.stderr)
+        self.assertEqual(zlib.crc32(printed.stdout.encode()), record["events_crc32"])
+        self.assertEqual(json.loads(printed.stderr), record["counters"])
+
+    def test_a_file_of_raw_bytes_is_a_line_that_ends_and_cannot_be_told_anything(self) -> None:
+        with tempfile.TemporaryDirectory() as directory:
+            file = Path(directory, "heard")
+            file.write_bytes(exploration())
+            heard = b""
+            with open_line(str(file)) as line:
+                with self.assertRaises(OSError):
+                    line.write(b"x")
+                with self.assertRaises(EOFError):
+                    while True:
+                        heard += line.read()
+        self.assertEqual(heard, exploration())
+
+    def test_a_line_that_cannot_be_opened_is_a_message_and_not_a_trace(self) -> None:
+        for name in ("tcp:127.0.0.1", "tcp:127.0.0.1:1", "/no/such/port"):
+            with self.subTest(name):
+                printed = script("-m", "toposlam_stream", name)
+                self.assertEqual(printed.returncode, 1)
+                self.assertIn("toposlam_stream: ", printed.stderr)
+                self.assertNotIn("Traceback", printed.stderr)
+
+    def test_a_serial_port_without_pyserial_says_what_to_install(self) -> None:
+        hidden = sys.modules.get("serial")
+        sys.modules["serial"] = None  # type: ignore[assignment]
+        try:
+            with self.assertRaisesRegex(ImportError, "pip install pyserial"):
+                open_line("/dev/ttyACM0")
+        finally:
+            del sys.modules["serial"]
+            if hidden is not None:
+                sys.modules["serial"] = hidden
+
+    @needs("pyserial", importlib.util.find_spec("serial") is not None and hasattr(os, "openpty"))
+    def test_a_serial_port_is_read_and_written(self) -> None:
+        robot, port = os.openpty()
+        with open_line(os.ttyname(port)) as line:
+            self.assertEqual(line.read(), b"")
+            os.write(robot, b"abc\0")
+            heard = b""
+            while len(heard) < 4:
+                heard += line.read()
+            self.assertEqual(heard, b"abc\0")
+            line.write(b"\1\2")
+            self.assertEqual(os.read(robot, 2), b"\1\2")
+        os.close(robot)
+        os.close(port)
+
+
+class Commanding(unittest.TestCase):
+    def test_a_request_is_repeated_until_its_reply_comes(self) -> None:
+        ear, mouth = Decoder(requests=True), Encoder()
+        to_client = [b"noise"]
+        asked = []
+
+        def answer(data: bytes) -> None:
+            for event in ear.feed(data):
+                asked.append(event.message)
+                to_client.append(mouth.encode(Reply(event.message.id ^ 1, Outcome.Done())))
+                to_client.append(mouth.encode(Journey(3, JourneyState.UNDERWAY)))
+                if len(asked) > 1:
+                    to_client.append(b"\0" + mouth.encode(Reply(event.message.id, Outcome.Refused(Refusal.NO_ROUTE))))
+
+        heard = []
+        client = Client(Line(lambda: to_client.pop(0) if to_client else b"", answer, lambda: None), heard.append)
+        client.timeout_s = 0.05
+        self.assertEqual(client.request(Command.GoTo(3)), Outcome.Refused(Refusal.NO_ROUTE))
+        self.assertEqual(len(asked), 2)
+        self.assertEqual(asked[0], asked[1], "the very same request, so that it is executed once")
+        self.assertEqual(client.picture.journey, Journey(3, JourneyState.UNDERWAY))
+        self.assertTrue(any(isinstance(event, Damaged) for event in heard))
+        client.request(Command.Explore())
+        self.assertNotEqual(asked[2].id, asked[0].id)
+
+    def test_a_robot_that_does_not_answer_is_given_up(self) -> None:
+        sent = []
+        client = Client(Line(lambda: b"", sent.append, lambda: None))
+        client.timeout_s, client.attempts = 0.01, 3
+        with self.assertRaises(NoReply):
+            client.request(Command.Info())
+        self.assertEqual(len(sent), 3)
+
+    def toposlam(self) -> Optional[Path]:
+        target = Path(os.environ.get("CARGO_TARGET_DIR", REPOSITORY / "target"))
+        built = [target / profile / "toposlam" for profile in ("release", "debug")]
+        return next((path for path in built if path.is_file()), None)
+
+    def test_a_simulated_robot_does_what_it_is_told(self) -> None:
+        toposlam = self.toposlam()
+        if toposlam is None:
+            print("SKIPPED: the command toposlam is not built", file=sys.stderr)
+            self.assertNotEqual(os.environ.get("CI"), "true", "cargo build first")
+            self.skipTest("the command toposlam is not built")
+        arguments = [str(toposlam), "robot", "--listen", "127.0.0.1:0", "--speed", "30"]
+        with subprocess.Popen(arguments, stdout=subprocess.PIPE, text=True) as robot:
+            try:
+                name = robot.stdout.readline().split()[-1]
+                with open_line(name) as line:
+                    client = Client(line)
+                    info = client.request(Command.Info())
+                    self.assertIsInstance(info, Outcome.Info)
+                    self.assertEqual(client.request(Command.GoTo(200)), Outcome.Refused(Refusal.UNKNOWN_VERTEX))
+                    self.assertEqual(client.request(Command.Pause(True)), Outcome.Done())
+                    self.assertEqual(client.request(Command.SetConfig(Setting.NOISE_MM, 40)), Outcome.Done())
+                    self.assertEqual(client.request(Command.GetMap()), Outcome.Done())
+                    while not client.picture.is_converged():
+                        client.listen()
+                    self.assertIsNone(client.picture.hello.complaint())
+                    self.assertTrue(client.request(Command.Info()).paused)
+                    self.assertEqual(client.decoder.counters.unknown_message, 0)
+            finally:
+                robot.kill()
+
+
+class Example(unittest.TestCase):
+    @needs("matplotlib", importlib.util.find_spec("matplotlib") is not None)
+    def test_the_map_of_a_recording_is_plotted(self) -> None:
+        with tempfile.TemporaryDirectory() as directory:
+            recording, picture = Path(directory, "heard"), Path(directory, "map.png")
+            recording.write_bytes(exploration())
+            printed = script(str(PYTHON / "examples/plot_map.py"), str(recording), "--save", str(picture))
+            self.assertEqual(printed.returncode, 0, printed.stderr)
+            self.assertEqual(picture.read_bytes()[:8], b"\x89PNG\r\n\x1a\n")
+            blank = Path(directory, "blank.png")
+            recording.write_bytes(Encoder().encode(Map(0, 0, 0)))
+            script(str(PYTHON / "examples/plot_map.py"), str(recording), "--save", str(blank))
+            self.assertGreater(picture.stat().st_size, blank.stat().st_size + 5000, "something is drawn")
+
+    @needs("matplotlib", importlib.util.find_spec("matplotlib") is not None)
+    def test_a_robot_that_never_stops_is_plotted_after_the_time(self) -> None:
+        def talk(connection: socket.socket) -> None:
+            try:
+                while True:
+                    connection.sendall(exploration())
+            except OSError:
+                pass
+
+        with tempfile.TemporaryDirectory() as directory, Listeners(talk) as robot:
+            picture = Path(directory, "map.png")
+            printed = script(str(PYTHON / "examples/plot_map.py"), robot.name, "--save", str(picture), "--seconds", "0.5")
+            self.assertEqual(printed.returncode, 0, printed.stderr)
+            self.assertTrue(picture.is_file())
+
+    def test_the_rate_of_decoding_is_measured(self) -> None:
+        with tempfile.TemporaryDirectory() as directory:
+            recording = Path(directory, "heard")
+            recording.write_bytes(exploration())
+            printed = script(str(PYTHON / "examples/decode_rate.py"), str(recording))
+        self.assertRegex(printed.stdout, r"MB/s, \d+ frames/s\n")
+
+
+if __name__ == "__main__":
+    unittest.main()
