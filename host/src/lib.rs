@@ -26,6 +26,8 @@ pub mod mapping;
 pub mod nearness;
 pub mod picture;
 pub mod recording;
+pub mod setting;
 pub mod soak;
 pub mod topology;
+pub mod wording;
 pub mod world;
