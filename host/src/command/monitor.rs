@@ -1,6 +1,7 @@
 //! `toposlam monitor`: watch a robot live in this terminal, and tell it what to do.
 
 use std::io::stdout;
+use std::ops::ControlFlow;
 use std::time::Duration;
 
 use anyhow::ensure;
@@ -34,7 +35,7 @@ pub(crate) struct Arguments {
 pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     let (line, baud, options) = (&arguments.line, arguments.baud, Options::default());
     if !arguments.headless {
-        return screen::run(line, baud, options, |_| ());
+        return screen::run(line, baud, options, |_| ControlFlow::Continue(()));
     }
     let time = arguments.seconds.map(Duration::try_from_secs_f64).transpose()?;
     ensure!(arguments.events != Some(0), "0 events are none to wait for");

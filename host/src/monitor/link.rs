@@ -390,3 +390,6 @@ impl<READ> Write for ReadOnly<READ> {
         Ok(())
     }
 }
+
+#[cfg(test)]
+mod tests;

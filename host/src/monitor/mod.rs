@@ -38,3 +38,6 @@ pub mod model;
 mod prompt;
 pub mod screen;
 pub mod view;
+
+#[cfg(test)]
+mod tests;

@@ -1,6 +1,7 @@
 //! The monitor on the terminal that this program runs in.
 
 use std::io::{self, IsTerminal, Stdout, stdout};
+use std::ops::ControlFlow;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, sync_channel};
@@ -35,13 +36,18 @@ enum Input {
     Failed(io::Error),
 }
 
-/// Shows a robot until a key or a signal ends it. `drawn` is called after each frame, with what it shows.
+/// Shows a robot until a key, a signal or `drawn` ends it, which is called after each frame with what is shown.
 ///
 /// `name` is the name of the line, `-` for the standard input; the keys come from the terminal even then.
 ///
 /// # Errors
 /// When the standard output is no terminal, or the terminal fails.
-pub fn run(name: &str, baud: u32, options: Options, mut drawn: impl FnMut(&Model)) -> anyhow::Result<()> {
+pub fn run(
+    name: &str,
+    baud: u32,
+    options: Options,
+    mut drawn: impl FnMut(&Model) -> ControlFlow<()>,
+) -> anyhow::Result<()> {
     ensure!(stdout().is_terminal(), "the standard output is no terminal; --headless needs none");
     let ended = Arc::new(AtomicBool::new(false));
     #[cfg(unix)]
@@ -65,7 +71,7 @@ fn show(
     link: &Link,
     inputs: &Receiver<Input>,
     ended: &AtomicBool,
-    drawn: &mut impl FnMut(&Model),
+    drawn: &mut impl FnMut(&Model) -> ControlFlow<()>,
 ) -> anyhow::Result<()> {
     let mut last_frame: Option<Instant> = None;
     let mut changed = true;
@@ -96,7 +102,9 @@ fn show(
         if last_frame.is_none_or(|last| last.elapsed() >= frame_time) {
             model.settle(Instant::now());
             screen.terminal.draw(|frame| view::draw(frame, model)).context("drawing")?;
-            drawn(model);
+            if drawn(model).is_break() {
+                return Ok(());
+            }
             last_frame = Some(Instant::now());
             changed = false;
         }
