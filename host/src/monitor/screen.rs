@@ -143,6 +143,7 @@ impl Screen {
             before(panic);
         }));
         enable_raw_mode()?;
+        IS_TAKEN.store(true, Ordering::Relaxed);
         let entered = execute!(stdout(), EnterAlternateScreen);
         match entered.and_then(|()| Terminal::new(CrosstermBackend::new(stdout()))) {
             Ok(terminal) => Ok(Self { terminal }),
@@ -160,8 +161,14 @@ impl Drop for Screen {
     }
 }
 
-/// Nothing can be done about a terminal that does not take it.
+/// Whether the terminal is to be given back.
+static IS_TAKEN: AtomicBool = AtomicBool::new(false);
+
+/// Once only: leaving the screen again would put the cursor back to where it was, and a panic's message would be written over.
 fn give_back() {
-    let _ = disable_raw_mode();
-    let _ = execute!(stdout(), LeaveAlternateScreen, Show);
+    if IS_TAKEN.swap(false, Ordering::Relaxed) {
+        // Nothing can be done about a terminal that does not take it.
+        let _ = disable_raw_mode();
+        let _ = execute!(stdout(), LeaveAlternateScreen, Show);
+    }
 }

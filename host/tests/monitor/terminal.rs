@@ -32,6 +32,7 @@ impl PseudoTerminal {
         let mut script = Command::new("script")
             .args(["--quiet", "--return", "--command", &all, "/dev/null"])
             .env("TERM", "xterm-256color")
+            .env("RUST_BACKTRACE", "0")
             .env("SHELL", "/bin/sh")
             .stdin(Stdio::piped())
             .stdout(Stdio::piped())
