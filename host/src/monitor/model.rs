@@ -26,7 +26,7 @@ pub struct Model {
     listener: Listener,
     map: TopologicalMap,
     layout: Layout,
-    /// The robot numbers its vertices anew, or there is another robot: the map that was arranged is not the one to be.
+    /// Whether the map was arranged since its vertices got new numbers.
     arranged: bool,
     heard_at: Option<Instant>,
     quiet: Option<Duration>,
