@@ -1,14 +1,17 @@
-//! Laptop side of toposlam: the simulated world, recordings, the emulated robot, a client of a real one, pictures of maps,
-//! and their evaluation.
+//! Laptop side of toposlam: the simulated world, recordings, the emulated robot, what is at the other end of a robot's line,
+//! and how right maps are.
 //!
-//! [`world`] stands in for a building and a robot with a ring of sonars, [`recording`] for a real one; both yield the
-//! ring frames that [`mapping`] turns into a map on this computer; [`nearness`] says how near to the Voronoi graph a recorded robot
-//! drove, and [`laps`] compares the laps of a round. [`exploration`] is a whole robot that drives through such a building by its
-//! own code, [`injector`] makes the faults that it meets, and [`soak`] lets it live with them for a day. [`emulator`] runs the
-//! firmware with such frames, and
-//! [`chip`] answers for the chips on its sensor bus; [`listener`] understands what a robot says, [`client`] tells one on a [`mod@line`] what to do, and [`topology`] is its map as
-//! plain data; [`broadcast`] is the robot's end of such a line, and [`log`] records one. [`picture`] draws a map over its floor plan, and [`evaluation`]
-//! measures how often maps are right.
+//! Frames come from a building. [`world`] stands in for one and a robot with a ring of sonars, [`recording`] for a real ring; both
+//! yield the ring frames that [`mapping`] turns into a map on this computer. [`nearness`] says how near to the Voronoi graph a
+//! recorded robot drove, and [`laps`] compares the laps of a round. [`exploration`] is a whole robot that drives through such a
+//! building by its own code, [`injector`] makes the faults that it meets, and [`soak`] lets it live with them for a day. [`emulator`]
+//! runs the firmware with such frames, and [`chip`] answers for the chips on its sensor bus.
+//!
+//! Messages come from a robot. [`mod@line`] is the way to one and [`broadcast`] its end of it; [`listener`] understands what it says,
+//! [`client`] tells it what to do, [`topology`] is its map as plain data and [`layout`] where to draw that. [`monitor`] shows all in
+//! a terminal and [`log`] records it, with [`wording`], [`mod@setting`] and [`mod@json`] for what is said and set.
+//!
+//! Maps are right or wrong: [`picture`] draws one over its floor plan, and [`evaluation`] measures how often they are right.
 
 pub mod broadcast;
 pub mod chip;
@@ -24,9 +27,12 @@ pub mod line;
 pub mod listener;
 pub mod log;
 pub mod mapping;
+pub mod monitor;
 pub mod nearness;
 pub mod picture;
 pub mod recording;
+pub mod setting;
 pub mod soak;
 pub mod topology;
+pub mod wording;
 pub mod world;
