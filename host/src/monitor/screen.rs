@@ -22,6 +22,8 @@ use super::view;
 
 /// News that wait to be taken in; a link that has more to say waits.
 const QUEUE: usize = 1024;
+/// What a robot says of a place comes in one burst: a frame waits so long for the rest of it, or it would be drawn with the next one.
+const BURST_TIME: Duration = Duration::from_millis(2);
 /// There is nothing to see in more frames than this, and a slow line would only fall behind.
 const LEAST_FRAME_TIME: Duration = Duration::from_millis(16);
 /// Without news the frame is drawn this often, for what depends on the time.
@@ -83,6 +85,7 @@ fn show(
             Err(RecvTimeoutError::Timeout) => None,
             Err(RecvTimeoutError::Disconnected) => bail!("the link and the keys are gone"),
         };
+        let burst_ends = Instant::now() + BURST_TIME;
         for _ in 0..QUEUE {
             let Some(something) = input else { break };
             changed = true;
@@ -96,7 +99,7 @@ fn show(
                 Input::Resized => {}
                 Input::Failed(error) => return Err(error).context("reading the keys"),
             }
-            input = inputs.try_recv().ok();
+            input = inputs.recv_timeout(burst_ends.saturating_duration_since(Instant::now())).ok();
         }
         let frame_time = if changed { LEAST_FRAME_TIME } else { IDLE_FRAME_TIME };
         if last_frame.is_none_or(|last| last.elapsed() >= frame_time) {
