@@ -7,7 +7,7 @@
 //! own code, [`injector`] makes the faults that it meets, and [`soak`] lets it live with them for a day. [`emulator`] runs the
 //! firmware with such frames, and
 //! [`chip`] answers for the chips on its sensor bus; [`listener`] understands what a robot says, [`client`] tells one on a [`mod@line`] what to do, and [`topology`] is its map as
-//! plain data; [`broadcast`] is the robot's end of such a line. [`picture`] draws a map over its floor plan, and [`evaluation`]
+//! plain data; [`layout`] says where to draw it, and [`export`] hands it to other programs; [`broadcast`] is the robot's end of such a line. [`picture`] draws a map over its floor plan, and [`evaluation`]
 //! measures how often maps are right.
 
 pub mod broadcast;
@@ -16,6 +16,7 @@ pub mod client;
 pub mod emulator;
 pub mod evaluation;
 pub mod exploration;
+pub mod export;
 pub mod injector;
 pub mod json;
 pub mod laps;
