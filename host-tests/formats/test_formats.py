@@ -27,7 +27,7 @@ ROOT = Path(__file__).resolve().parents[2]
 TOPOSLAM = os.environ.get("TOPOSLAM", str(ROOT / "target/debug/toposlam"))
 PLACES = 60
 EDGE_M = 4.0
-POINTS_PER_EDGE = 100
+POINTS_PER_EDGE = 144
 MAP_COLOUR, ROBOT_COLOUR = (0xB3, 0x26, 0x1E), (0x0B, 0x57, 0xD0)
 
 

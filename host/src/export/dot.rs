@@ -7,7 +7,7 @@ use crate::layout::Point;
 use crate::topology::{TopologicalMap, Vertex};
 
 /// Graphviz measures positions in points, 72 to the inch; an edge is about this long.
-const POINTS_PER_EDGE: f64 = 100.0;
+const POINTS_PER_EDGE: f64 = 144.0;
 
 /// The map as an undirected DOT graph: nodes `0`, `1`, … with `label`, `radius_mm`, `visits` and `pos`. Where the robot is the rim is
 /// double.
