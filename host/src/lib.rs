@@ -19,6 +19,7 @@ pub mod client;
 pub mod emulator;
 pub mod evaluation;
 pub mod exploration;
+pub mod export;
 pub mod injector;
 pub mod json;
 pub mod laps;

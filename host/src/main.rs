@@ -34,6 +34,8 @@ enum Task {
     Play(command::play::Arguments),
     /// Watch a robot on a line live, and tell it what to do.
     Monitor(command::monitor::Arguments),
+    /// Write a robot's map in a format of other programs.
+    Export(command::export::Arguments),
     /// Tell a robot on a line what to do.
     Command(command::console::Arguments),
 }
@@ -50,6 +52,7 @@ fn main() -> anyhow::Result<()> {
         Task::Record(arguments) => command::record::run(&arguments),
         Task::Play(arguments) => command::play::run(&arguments),
         Task::Monitor(arguments) => command::monitor::run(&arguments),
+        Task::Export(arguments) => command::export::run(&arguments),
         Task::Command(arguments) => command::console::run(&arguments),
     }
 }

@@ -192,3 +192,22 @@ fn command_says_why_a_robot_did_not_do_it() {
     let text = complaint(&toposlam(&["command", &line, "set", "no-such-setting", "1"]));
     assert!(text.contains("noise-mm"), "the settings are listed: {text}");
 }
+
+#[test]
+fn export_writes_the_map_of_a_recording_and_says_what_is_wrong_with_it() {
+    let directory = tempfile::tempdir().unwrap();
+    let file = directory.path().join("robot.bin");
+    let name = file.to_str().unwrap();
+    let mut encoder = Encoder::default();
+    let mut frame = |message| encoder.encode(&message, &mut [0; MAX_FRAME_BYTES]).unwrap().to_vec();
+    let edge = frame(Message::Edge { a: 0, b: 1, present: true });
+    std::fs::write(&file, &edge).unwrap();
+    let output = toposlam(&["export", name, "--format", "graphml"]);
+    assert!(printed(&output).contains("<edge source=\"0\" target=\"1\"/>"));
+    assert!(String::from_utf8_lossy(&output.stderr).contains("not heard whole"));
+
+    std::fs::write(&file, b"no robot").unwrap();
+    assert!(complaint(&toposlam(&["export", name, "--format", "svg"])).contains("no map was heard"));
+    assert!(complaint(&toposlam(&["export", name, "--format", "png"])).contains("graphml, dot, geojson, json, svg"));
+    assert!(complaint(&toposlam(&["export", name, "--format", "geojson", "--edge-m", "0"])).contains("0.1 to 1000"));
+}

@@ -6,6 +6,7 @@ mod drive;
 pub(crate) mod emulate;
 pub(crate) mod evaluate;
 pub(crate) mod explore;
+pub(crate) mod export;
 mod filter;
 mod hardship;
 mod interrupt;

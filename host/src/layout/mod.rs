@@ -128,4 +128,6 @@ impl Layout {
 }
 
 #[cfg(test)]
+mod exploration_tests;
+#[cfg(test)]
 mod tests;

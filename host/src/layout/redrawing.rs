@@ -58,21 +58,22 @@ fn planar_part(graph: &Graph) -> Graph {
     part
 }
 
+/// A way to the positions of a triangulation's vertices.
+type Method = fn(&Triangulation) -> Vec<Point>;
+
 /// A picture of a planar graph without conflicts.
 ///
 /// What is drawn without trees and bends looks best, but may leave no room for them; the last way always works.
 fn draw(graph: &Graph) -> Vec<Point> {
-    let ways: [(fn(&Graph) -> Reduction, fn(&Triangulation) -> Vec<Point>); 3] =
-        [(Reduction::of, barycentres::draw), (Reduction::none, barycentres::draw), (Reduction::none, drawing::draw)];
+    let ways: [(bool, Method); 3] = [(true, barycentres::draw), (false, barycentres::draw), (false, drawing::draw)];
     let mut best: Option<(f64, Vec<Point>)> = None;
-    for (reduce, positions) in ways {
-        let drawn = draw_in_one_way(graph, &reduce(graph), positions);
-        if let Some((growth, points)) = drawn
+    for (is_reduced, method) in ways {
+        let reduction = if is_reduced { Reduction::of(graph) } else { Reduction::none(graph) };
+        if let Some((growth, points)) = draw_in_one_way(graph, &reduction, method)
             && best.as_ref().is_none_or(|(least, _)| growth < *least)
         {
-            let is_good = growth < TOO_SMALL;
             best = Some((growth, points));
-            if is_good {
+            if growth < TOO_SMALL {
                 break;
             }
         }
@@ -81,14 +82,10 @@ fn draw(graph: &Graph) -> Vec<Point> {
 }
 
 /// A picture without conflicts, and by how much it had to grow for that; `None` when there is no room, or it is no planar graph.
-fn draw_in_one_way(
-    graph: &Graph,
-    reduction: &Reduction,
-    positions: fn(&Triangulation) -> Vec<Point>,
-) -> Option<(f64, Vec<Point>)> {
+fn draw_in_one_way(graph: &Graph, reduction: &Reduction, method: Method) -> Option<(f64, Vec<Point>)> {
     let mut points = vec![Point::UNKNOWN; graph.vertices()];
     if !reduction.kept.is_empty() {
-        let kept = positions(&Triangulation::of(&reduction.graph)?);
+        let kept = method(&Triangulation::of(&reduction.graph)?);
         reduction.kept.iter().zip(kept).for_each(|(&vertex, at)| points[vertex] = at);
     }
     for &(bend, (one, other)) in reduction.bends.iter().rev() {

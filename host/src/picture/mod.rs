@@ -1,11 +1,14 @@
 //! Pictures: a map over its floor plan, as SVG.
 
+pub(crate) mod marks;
+
 use std::cmp::Reverse;
 
 use svg::Document;
-use svg::node::element::{Circle, Group, Line, Path, Polyline, Rectangle, Text, Title, path::Data};
+use svg::node::element::{Circle, Group, Path, Polyline, Rectangle, Title, path::Data};
 use toposlam::Map;
 
+use self::marks::{MAP_COLOUR, Mark, words};
 use crate::world::{Detection, Plan, Point, TrueMap};
 
 /// A vertex of the map to be drawn.
@@ -73,8 +76,6 @@ fn mostly_at(visits: &[Detection]) -> Point {
 }
 
 const MARGIN_MM: f64 = 600.0;
-const MAP_COLOUR: &str = "#b3261e";
-const DOT_MM: f64 = 330.0;
 /// Vertices nearer than this to each other are drawn this far apart.
 const SIDE_BY_SIDE_MM: f64 = 1100.0;
 
@@ -118,32 +119,26 @@ pub fn draw(plan: &Plan, truth: &TrueMap, drawing: &Drawing) -> String {
         ways = ways.add(Polyline::new().set("points", points.join(" ")));
     }
     let document = document.add(ways);
-    let points: Vec<(f64, f64)> = spread(&drawing.vertices).into_iter().map(at).collect();
-    let mut edges = Group::new().set("fill", "none").set("stroke", MAP_COLOUR).set("stroke-width", 90);
-    for (from, to) in &drawing.edges {
-        let (Some((x1, y1)), Some((x2, y2))) = (points.get(*from), points.get(*to)) else { continue };
-        edges = if from == to {
-            edges.add(Circle::new().set("cx", *x1).set("cy", y1 - DOT_MM).set("r", DOT_MM))
-        } else {
-            edges.add(Line::new().set("x1", *x1).set("y1", *y1).set("x2", *x2).set("y2", *y2))
-        };
-    }
+    let points = spread(&drawing.vertices);
+    let marks: Vec<Mark> = points
+        .into_iter()
+        .zip(&drawing.vertices)
+        .map(|(point, vertex)| Mark {
+            at: at(point),
+            radius_mm: vertex.radius_mm,
+            name: vertex.name.clone(),
+            is_here: false,
+        })
+        .collect();
     let mut discs = Group::new().set("fill", MAP_COLOUR).set("fill-opacity", 0.08).set("stroke", MAP_COLOUR);
-    let mut dots = Group::new().set("text-anchor", "middle");
-    for (vertex, (x, y)) in drawing.vertices.iter().zip(points) {
-        let (disc_x, disc_y) = at(vertex.position);
-        discs = discs.add(Circle::new().set("cx", disc_x).set("cy", disc_y).set("r", vertex.radius_mm));
-        let radius = words(&format!("{:.2} m", vertex.radius_mm / 1000.0), x, y + DOT_MM + 320.0, 300.0);
-        dots = dots
-            .add(Circle::new().set("cx", x).set("cy", y).set("r", DOT_MM).set("fill", MAP_COLOUR))
-            .add(words(&vertex.name, x, y + 130.0, 380.0).set("fill", "white"))
-            // A white rim keeps the words legible over the edges.
-            .add(radius.set("stroke", "white").set("stroke-width", 90).set("paint-order", "stroke"));
+    for vertex in &drawing.vertices {
+        let (x, y) = at(vertex.position);
+        discs = discs.add(Circle::new().set("cx", x).set("cy", y).set("r", vertex.radius_mm));
     }
     document
         .add(discs.set("stroke-width", 25))
-        .add(edges)
-        .add(dots)
+        .add(marks::edges(&marks, &drawing.edges))
+        .add(marks::dots(&marks))
         .add(words(&drawing.caption, 300.0, height_mm + 1.3 * MARGIN_MM, 520.0))
         .add(Title::new(&*drawing.caption))
         .to_string()
@@ -168,10 +163,6 @@ fn walls(plan: &Plan) -> Path {
         }
     }
     Path::new().set("d", data).set("fill", "#c9c9c9")
-}
-
-fn words(words: &str, x: f64, y: f64, size_mm: f64) -> Text {
-    Text::new(words).set("x", x).set("y", y).set("font-size", size_mm).set("fill", "#222222")
 }
 
 #[cfg(test)]
