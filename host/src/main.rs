@@ -32,6 +32,8 @@ enum Task {
     Record(command::record::Arguments),
     /// Hear a recording of `record` again, or let others hear it.
     Play(command::play::Arguments),
+    /// Watch a robot on a line live, and tell it what to do.
+    Monitor(command::monitor::Arguments),
     /// Tell a robot on a line what to do.
     Command(command::console::Arguments),
 }
@@ -47,6 +49,7 @@ fn main() -> anyhow::Result<()> {
         Task::Robot(arguments) => command::robot::run(&arguments),
         Task::Record(arguments) => command::record::run(&arguments),
         Task::Play(arguments) => command::play::run(&arguments),
+        Task::Monitor(arguments) => command::monitor::run(&arguments),
         Task::Command(arguments) => command::console::run(&arguments),
     }
 }

@@ -9,6 +9,7 @@ pub(crate) mod explore;
 mod filter;
 mod hardship;
 mod interrupt;
+pub(crate) mod monitor;
 pub(crate) mod play;
 mod rails;
 pub(crate) mod record;
