@@ -7,7 +7,8 @@
 //! own code, [`injector`] makes the faults that it meets, and [`soak`] lets it live with them for a day. [`emulator`] runs the
 //! firmware with such frames, and
 //! [`chip`] answers for the chips on its sensor bus; [`listener`] understands what a robot says, [`client`] tells one on a [`mod@line`] what to do, and [`topology`] is its map as
-//! plain data; [`broadcast`] is the robot's end of such a line, and [`log`] records one. [`monitor`] shows all that live in a terminal, with
+//! plain data; [`broadcast`] is the robot's end of such a line, and [`log`] records one. [`monitor`] shows all that live in a terminal, [`fleet`]
+//! listens to a thousand robots at once, and `publish` (feature `mqtt`) tells a broker, with
 //! [`wording`], [`mod@setting`] and [`mod@json`] for what is said and set. [`picture`] draws a map over its floor plan, and [`evaluation`]
 //! measures how often maps are right.
 
@@ -17,6 +18,7 @@ pub mod client;
 pub mod emulator;
 pub mod evaluation;
 pub mod exploration;
+pub mod fleet;
 pub mod injector;
 pub mod json;
 pub mod laps;
@@ -28,6 +30,8 @@ pub mod mapping;
 pub mod monitor;
 pub mod nearness;
 pub mod picture;
+#[cfg(feature = "mqtt")]
+pub mod publish;
 pub mod recording;
 pub mod setting;
 pub mod soak;
