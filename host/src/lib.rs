@@ -8,8 +8,9 @@
 //! runs the firmware with such frames, and [`chip`] answers for the chips on its sensor bus.
 //!
 //! Messages come from a robot. [`mod@line`] is the way to one and [`broadcast`] its end of it; [`listener`] understands what it says,
-//! [`client`] tells it what to do, [`topology`] is its map as plain data and [`layout`] where to draw that. [`monitor`] shows all in
-//! a terminal and [`log`] records it, with [`wording`], [`mod@setting`] and [`mod@json`] for what is said and set.
+//! [`client`] tells it what to do, [`topology`] is its map as plain data and [`layout`] where to draw that. [`export`] writes the map
+//! for other programs, [`monitor`] shows all in a terminal and [`log`] records it, with [`wording`], [`mod@setting`] and [`mod@json`]
+//! for what is said and set. [`fleet`] listens to a thousand robots at once, and `publish` (feature `mqtt`) tells a broker.
 //!
 //! Maps are right or wrong: [`picture`] draws one over its floor plan, and [`evaluation`] measures how often they are right.
 
@@ -20,6 +21,7 @@ pub mod emulator;
 pub mod evaluation;
 pub mod exploration;
 pub mod export;
+pub mod fleet;
 pub mod injector;
 pub mod json;
 pub mod laps;
@@ -31,6 +33,8 @@ pub mod mapping;
 pub mod monitor;
 pub mod nearness;
 pub mod picture;
+#[cfg(feature = "mqtt")]
+pub mod publish;
 pub mod recording;
 pub mod setting;
 pub mod soak;

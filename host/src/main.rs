@@ -36,6 +36,14 @@ enum Task {
     Monitor(command::monitor::Arguments),
     /// Write a robot's map in a format of other programs.
     Export(command::export::Arguments),
+    /// Listen to many robots at once, and say what that costs.
+    Fleet(command::fleet::Arguments),
+    /// Be many recorded robots at the other end of a TCP port.
+    #[command(hide = true)]
+    Robots(command::robots::Arguments),
+    /// Tell an MQTT broker all that a robot on a line says.
+    #[cfg(feature = "mqtt")]
+    Publish(command::publish::Arguments),
     /// Tell a robot on a line what to do.
     Command(command::console::Arguments),
 }
@@ -53,6 +61,10 @@ fn main() -> anyhow::Result<()> {
         Task::Play(arguments) => command::play::run(&arguments),
         Task::Monitor(arguments) => command::monitor::run(&arguments),
         Task::Export(arguments) => command::export::run(&arguments),
+        Task::Fleet(arguments) => command::fleet::run(&arguments),
+        Task::Robots(arguments) => command::robots::run(&arguments),
+        #[cfg(feature = "mqtt")]
+        Task::Publish(arguments) => command::publish::run(&arguments),
         Task::Command(arguments) => command::console::run(&arguments),
     }
 }

@@ -8,13 +8,17 @@ pub(crate) mod evaluate;
 pub(crate) mod explore;
 pub(crate) mod export;
 mod filter;
+pub(crate) mod fleet;
 mod hardship;
 mod interrupt;
 pub(crate) mod monitor;
 pub(crate) mod play;
+#[cfg(feature = "mqtt")]
+pub(crate) mod publish;
 mod rails;
 pub(crate) mod record;
 pub(crate) mod replay;
 pub(crate) mod robot;
+pub(crate) mod robots;
 pub(crate) mod simulate;
 pub(crate) mod soak;
