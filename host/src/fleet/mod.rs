@@ -205,16 +205,11 @@ impl Fleet {
             totals.bytes += robot.bytes;
             totals.places += robot.places;
             totals.lost += u64::from(counters.lost);
-            totals.damaged += [
-                counters.corrupt,
-                counters.cut,
-                counters.too_long,
-                counters.unknown_version,
-                counters.unknown_message,
-            ]
-            .map(u64::from)
-            .iter()
-            .sum::<u64>();
+            totals.damaged +=
+                [counters.corrupt, counters.cut, counters.too_long, counters.unknown_version, counters.unknown_message]
+                    .map(u64::from)
+                    .iter()
+                    .sum::<u64>();
         }
         totals
     }
