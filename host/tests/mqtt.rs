@@ -5,7 +5,7 @@ use std::io::Write;
 use std::net::{TcpListener, TcpStream};
 use std::path::Path;
 use std::process::{Child, Command, Stdio};
-use std::sync::mpsc::{Receiver, channel};
+use std::sync::mpsc::channel;
 use std::thread;
 use std::time::{Duration, Instant};
 
@@ -54,8 +54,9 @@ fn free_port() -> u16 {
 fn start_broker(program: &str, directory: &Path, port: u16) -> Process {
     let settings = directory.join("mosquitto.conf");
     std::fs::write(&settings, format!("listener {port} 127.0.0.1\nallow_anonymous true\npersistence false\n")).unwrap();
-    let broker = Command::new(program).arg("-c").arg(&settings).stdout(Stdio::null()).stderr(Stdio::null());
-    let broker = Process(broker.spawn().unwrap());
+    let mut command = Command::new(program);
+    let broker = command.arg("-c").arg(&settings).stdout(Stdio::null()).stderr(Stdio::null()).spawn();
+    let broker = Process(broker.unwrap());
     let start = Instant::now();
     while TcpStream::connect(("127.0.0.1", port)).is_err() {
         assert!(start.elapsed() < DEADLINE, "the broker does not answer");
@@ -116,42 +117,46 @@ fn is_map(message: &Publish, map: &TopologicalMap) -> bool {
         && number(&json["digest"]) == u64::from(map.digest())
 }
 
-/// A robot that explores once someone listens, stands still after some places, and tells its map.
-fn robot() -> (String, Receiver<TopologicalMap>) {
+/// A robot that explores once someone listens, and then only repeats what it knows.
+fn robot() -> String {
     let mut broadcast = Broadcast::bind("127.0.0.1:0").unwrap();
     let line = format!("tcp:{}", broadcast.address().unwrap());
-    let (sender, map) = channel();
     thread::spawn(move || {
-        while broadcast.listeners() == 0 {
-            broadcast.exchange(&[]);
-            thread::sleep(SHORT);
-        }
-        let map = explore(|said| {
+        let mut say = |said: &[u8]| {
             broadcast.exchange(said);
             thread::sleep(SHORT);
+            broadcast.listeners()
+        };
+        while say(&[]) == 0 {}
+        let mut buffer = [0; SNAPSHOT_BYTES];
+        let mut exploration = explored(&mut buffer, |said| {
+            say(said);
         });
-        sender.send(map.unwrap()).unwrap();
+        exploration.command(toposlam::wire::Command::Pause { on: true });
         loop {
-            broadcast.exchange(&[]);
-            thread::sleep(SHORT);
+            exploration.advance();
+            say(&exploration.board().sent);
         }
     });
-    (line, map)
+    line
 }
 
-/// Lets a robot explore and gives its map, all of which it has then said.
-fn explore(mut say: impl FnMut(&[u8])) -> Option<TopologicalMap> {
-    let mut buffer = [0; SNAPSHOT_BYTES];
-    let plan = Plan::built_in("flat")?;
-    let mut exploration = Exploration::start(&plan, RobotModel::default(), 1, &mut buffer).ok()?;
+/// Lets a robot explore until it has said all of its map: the same one each time.
+fn explored(buffer: &mut [u8], mut say: impl FnMut(&[u8])) -> Exploration<'_> {
+    let plan = Plan::built_in("flat").unwrap();
+    let mut exploration = Exploration::start(&plan, RobotModel::default(), 1, buffer).unwrap();
     let mut listener = Listener::new();
-    while exploration.places() < PLACES || !listener.picture().is_converged() {
+    while exploration.places() < PLACES || !listener.picture().is_converged() || listener.map() != map(&exploration) {
         exploration.advance();
         let said = &exploration.board().sent;
         listener.feed(said, |_, _| ());
         say(said);
     }
-    Some(TopologicalMap::from(exploration.robot().mapper().map()))
+    exploration
+}
+
+fn map(exploration: &Exploration<'_>) -> TopologicalMap {
+    TopologicalMap::from(exploration.robot().mapper().map())
 }
 
 #[test]
@@ -162,14 +167,15 @@ fn whoever_subscribes_late_gets_the_robots_map_and_learns_when_the_publisher_is_
     let _broker = start_broker(program, directory.path(), port);
     let mut early = Subscriber::connect(port, "early");
 
-    let (line, map) = robot();
+    let map = map(&explored(&mut [0; SNAPSHOT_BYTES], |_| ()));
+    let line = robot();
     let publisher = Command::new(env!("CARGO_BIN_EXE_toposlam"))
         .args(["publish", &line, "--robot", "kitchen", "--frames", "--broker", &format!("mqtt://127.0.0.1:{port}")])
         .stderr(Stdio::null())
         .spawn()
         .unwrap();
     let mut publisher = Process(publisher);
-    let (mut listener, mut places) = (Listener::new(), 0);
+    let (mut listener, mut places, mut has_map) = (Listener::new(), 0, false);
     early.wait_for(|message| {
         match message.topic.as_str() {
             "toposlam/kitchen/frames" => listener.feed(&message.payload, |_, _| ()),
@@ -179,12 +185,11 @@ fn whoever_subscribes_late_gets_the_robots_map_and_learns_when_the_publisher_is_
             }
             _ => {}
         }
-        places == PLACES && listener.picture().is_converged()
+        has_map |= message.topic == "toposlam/kitchen/map" && is_map(message, &map);
+        has_map && places > 0 && listener.picture().is_converged() && listener.map() == map
     });
-    let map = map.recv_timeout(DEADLINE).unwrap();
-    early.wait_for_map(&map);
     assert!(map.vertices.len() > 2 && !map.edges.is_empty());
-    assert_eq!(listener.map(), map);
+    assert_eq!((listener.counters().corrupt, listener.counters().unknown_message), (0, 0));
 
     let mut late = Subscriber::connect(port, "late");
     assert!(late.wait_for_map(&map).retain);
@@ -204,7 +209,8 @@ fn a_broker_that_was_away_gets_the_newest_map_and_what_it_missed_is_counted() {
     let mut publisher = Publisher::start(options, move |news| sender.send(news).unwrap_or_default());
     publisher.hear(&News::Connected);
     let (mut listener, mut events) = (Listener::new(), 0);
-    let map = explore(|said| {
+    let mut buffer = [0; SNAPSHOT_BYTES];
+    let exploration = explored(&mut buffer, |said| {
         listener.feed(said, |listener, event| {
             publisher.hear(&News::heard(listener, event));
             events += 1;
@@ -217,7 +223,7 @@ fn a_broker_that_was_away_gets_the_newest_map_and_what_it_missed_is_counted() {
         let broker = start_broker(program, directory.path(), port);
         assert_eq!(news.recv_timeout(DEADLINE).unwrap(), BrokerNews::Connected);
         let mut subscriber = Subscriber::connect(port, "subscriber");
-        subscriber.wait_for_map(map.as_ref().unwrap());
+        subscriber.wait_for_map(&map(&exploration));
         drop(broker);
         assert!(matches!(news.recv_timeout(DEADLINE).unwrap(), BrokerNews::Disconnected(_)));
     }
