@@ -19,7 +19,7 @@
 
 use petgraph::graph::UnGraph;
 use toposlam::Map;
-use toposlam::wire::Picture;
+use toposlam::wire::{Picture, crc32};
 
 /// The vertices of a map and the edges between them.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Hash)]
@@ -48,6 +48,18 @@ impl TopologicalMap {
             graph.add_edge(nodes[usize::from(a)], nodes[usize::from(b)], ());
         }
         graph
+    }
+
+    /// The number by which a robot names this map, see [`toposlam::wire::map_digest`].
+    pub fn digest(&self) -> u32 {
+        let mut bytes = vec![self.vertices.len() as u8];
+        for (label, neighbours) in self.vertices.iter().zip(self.neighbours()) {
+            let row = neighbours.iter().fold(0_u64, |row, vertex| row | 1 << vertex);
+            bytes.extend(label.radius_mm.to_le_bytes());
+            bytes.extend(label.visits.to_le_bytes());
+            bytes.extend(row.to_le_bytes());
+        }
+        crc32(&bytes)
     }
 
     /// For every vertex its neighbours in ascending order; a vertex with a self-loop is its own neighbour.
@@ -90,6 +102,18 @@ impl<const V: usize> From<&Map<V>> for TopologicalMap {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn the_digest_is_the_one_that_a_robot_has_of_the_same_map() {
+        let mut map: Map<8> = Map::new();
+        for radius_mm in [1200, 400, 700] {
+            map.add_vertex(toposlam::Fingerprint::from_radius_mm(radius_mm).unwrap()).unwrap();
+        }
+        map.add_edge(0, 2);
+        map.add_edge(1, 1);
+        assert_eq!(TopologicalMap::from(&map).digest(), toposlam::wire::map_digest(&map));
+        assert_eq!(TopologicalMap::default().digest(), toposlam::wire::map_digest(&Map::<8>::new()));
+    }
 
     #[test]
     fn a_map_of_which_little_was_heard_has_the_vertices_of_its_edges() {

@@ -15,6 +15,8 @@ use super::robots::pace;
 
 /// How often what was heard is told.
 const REPORT: Duration = Duration::from_secs(1);
+/// How long robots are waited for before what is heard is told.
+const CONNECTING: Duration = Duration::from_secs(5);
 
 /// Arguments of `toposlam fleet`.
 #[derive(Args)]
@@ -51,11 +53,11 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     let resident_before = resident_bytes();
     for (name, address) in &lines {
         fleet.connect(name, address);
+        fleet.listen(Duration::ZERO, |_, _, _| ())?;
     }
-    for robot in fleet.robots() {
-        if let Some(End::Failed(reason)) = robot.end() {
-            eprintln!("{}: {reason}", robot.name());
-        }
+    let began = Instant::now();
+    while fleet.totals().connecting > 0 && began.elapsed() < CONNECTING && !interrupt.is_told() {
+        fleet.listen(REPORT / 100, |_, _, _| ())?;
     }
     let end = arguments.seconds.map(Duration::from_secs);
     let start = Sample::take(Instant::now(), &fleet);
@@ -72,8 +74,15 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
         println!("{}", sample.since(&last));
         last = sample;
         let is_over = end.is_some_and(|end| last.at - start.at >= end);
-        if is_over || interrupt.is_told() || last.totals.connected == 0 {
+        if is_over || interrupt.is_told() || last.totals.connected + last.totals.connecting == 0 {
             break;
+        }
+    }
+    for robot in fleet.robots() {
+        match robot.end() {
+            Some(End::Closed) => eprintln!("{} closed its line", robot.name()),
+            Some(End::Failed(reason)) => eprintln!("{} failed: {reason}", robot.name()),
+            None => {}
         }
     }
     println!("in all: {}", last.since(&start));
@@ -108,7 +117,8 @@ impl Sample {
             format!("{messages:.0} messages, {bytes:.0} bytes, {places:.1} updates")
         };
         let mut text = format!(
-            "{} connected, {} closed, {} failed, {} maps whole; {} a second",
+            "{} connecting, {} connected, {} closed, {} failed, {} maps whole; {} a second",
+            now.connecting,
             now.connected,
             now.closed,
             now.failed,

@@ -42,7 +42,7 @@ pub fn allow_many_connections() -> io::Result<()> {
 }
 
 /// Bounds what the system holds for a line that is not read; a thousand that grow as they like can take all of its memory.
-pub(super) fn bound_receiving(stream: &TcpStream) -> io::Result<()> {
+pub(super) fn bound_receiving(stream: &mio::net::TcpStream) -> io::Result<()> {
     #[cfg(unix)]
     rustix::net::sockopt::set_socket_recv_buffer_size(stream, RECEIVE_BUFFER_BYTES)?;
     #[cfg(not(unix))]

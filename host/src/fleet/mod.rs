@@ -27,16 +27,15 @@ pub mod cost;
 pub mod crowd;
 
 use std::io::{self, ErrorKind, Read};
-use std::net::{TcpStream, ToSocketAddrs};
+use std::net::ToSocketAddrs;
 use std::time::Duration;
 
+use mio::net::TcpStream;
 use mio::{Events, Interest, Poll, Token};
 use toposlam::wire::Message;
 
 use crate::listener::{Event, Listener};
 
-/// How long a robot may take to answer the connection.
-const CONNECT_TIMEOUT: Duration = Duration::from_secs(2);
 /// What is read of one robot before the next one has its turn.
 const READ_BYTES: usize = 1 << 14;
 /// How many robots are told of in one look at all lines.
@@ -73,7 +72,8 @@ pub struct Robot {
 /// The state of a robot's line.
 #[derive(Debug)]
 enum Line {
-    Open(mio::net::TcpStream),
+    Opening(TcpStream),
+    Open(TcpStream),
     Ended(End),
 }
 
@@ -89,6 +89,8 @@ pub enum End {
 /// A fleet in numbers. Counts are since the start.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Totals {
+    /// Robots that have not answered yet.
+    pub connecting: usize,
     /// Robots whose line is open.
     pub connected: usize,
     /// Robots that closed their line.
@@ -124,16 +126,12 @@ impl Fleet {
         })
     }
 
-    /// Connects to a robot at `HOST:PORT` and gives its number, 0 for the first. One that does not answer within two seconds
-    /// has a number as well, and [`Robot::end`] says why.
+    /// Starts to connect to a robot at `HOST:PORT` and gives its number, 0 for the first; does not wait for it, but for the
+    /// name of its host. One that does not answer has a number as well, and [`Robot::end`] says why once the system gives up.
     pub fn connect(&mut self, name: &str, address: &str) -> usize {
-        let stream = address.to_socket_addrs().and_then(|mut addresses| {
-            let address = addresses.next().ok_or(ErrorKind::NotFound)?;
-            TcpStream::connect_timeout(&address, CONNECT_TIMEOUT)
-        });
         let number = self.robots.len();
-        let line = match stream.and_then(|stream| self.register(stream, number)) {
-            Ok(stream) => Line::Open(stream),
+        let line = match self.open(address, number) {
+            Ok(stream) => Line::Opening(stream),
             Err(error) => Line::Ended(End::Failed(error.kind())),
         };
         self.robots.push(Robot {
@@ -148,11 +146,12 @@ impl Fleet {
         number
     }
 
-    fn register(&self, stream: TcpStream, number: usize) -> io::Result<mio::net::TcpStream> {
-        stream.set_nonblocking(true)?;
+    fn open(&self, address: &str, number: usize) -> io::Result<TcpStream> {
+        let address = address.to_socket_addrs()?.next().ok_or(ErrorKind::NotFound)?;
+        let mut stream = TcpStream::connect(address)?;
         cost::bound_receiving(&stream)?;
-        let mut stream = mio::net::TcpStream::from_std(stream);
-        self.poll.registry().register(&mut stream, Token(number), Interest::READABLE)?;
+        // It becomes writable when it is connected.
+        self.poll.registry().register(&mut stream, Token(number), Interest::READABLE | Interest::WRITABLE)?;
         Ok(stream)
     }
 
@@ -194,10 +193,11 @@ impl Fleet {
     pub fn totals(&self) -> Totals {
         let mut totals = Totals::default();
         for robot in &self.robots {
-            match robot.end() {
-                None => totals.connected += 1,
-                Some(End::Closed) => totals.closed += 1,
-                Some(End::Failed(_)) => totals.failed += 1,
+            match robot.line {
+                Line::Opening(_) => totals.connecting += 1,
+                Line::Open(_) => totals.connected += 1,
+                Line::Ended(End::Closed) => totals.closed += 1,
+                Line::Ended(End::Failed(_)) => totals.failed += 1,
             }
             let counters = robot.listener.counters();
             totals.converged += usize::from(robot.is_converged());
@@ -205,18 +205,27 @@ impl Fleet {
             totals.bytes += robot.bytes;
             totals.places += robot.places;
             totals.lost += u64::from(counters.lost);
-            totals.damaged += [
-                counters.corrupt,
-                counters.cut,
-                counters.too_long,
-                counters.unknown_version,
-                counters.unknown_message,
-            ]
-            .map(u64::from)
-            .iter()
-            .sum::<u64>();
+            totals.damaged +=
+                [counters.corrupt, counters.cut, counters.too_long, counters.unknown_version, counters.unknown_message]
+                    .map(u64::from)
+                    .iter()
+                    .sum::<u64>();
         }
         totals
+    }
+}
+
+impl Line {
+    /// Looks what became of the connection.
+    fn settle(&mut self) {
+        let Self::Opening(stream) = self else { return };
+        let result = stream.take_error().and_then(|error| error.map_or(Ok(()), Err)).and_then(|()| stream.peer_addr());
+        *self = match (result, std::mem::replace(self, Self::Ended(End::Closed))) {
+            (Ok(_), Self::Opening(stream)) => Self::Open(stream),
+            (Err(error), Self::Opening(stream)) if error.kind() == ErrorKind::NotConnected => Self::Opening(stream),
+            (Err(error), _) => Self::Ended(End::Failed(error.kind())),
+            (Ok(_), other) => other,
+        };
     }
 }
 
@@ -234,7 +243,7 @@ impl Robot {
     /// Why it is not heard any more; `None` while it is.
     pub const fn end(&self) -> Option<End> {
         match self.line {
-            Line::Open(_) => None,
+            Line::Opening(_) | Line::Open(_) => None,
             Line::Ended(end) => Some(end),
         }
     }
@@ -256,6 +265,7 @@ impl Robot {
 
     /// Reads a piece; whether there may be more.
     fn read(&mut self, buffer: &mut [u8], mut heard: impl FnMut(&Listener, Event<'_>)) -> bool {
+        self.line.settle();
         let Line::Open(stream) = &mut self.line else { return false };
         let end = match stream.read(buffer) {
             Ok(0) => End::Closed,

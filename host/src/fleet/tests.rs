@@ -47,7 +47,8 @@ fn a_robot_that_dies_and_one_that_talks_nonsense_do_not_disturb_the_others() {
         // What does not fit, because the fleet is behind, is not said.
         let _ = nonsense_end.write(&garbage);
         fleet.listen(PATIENCE, |_, _, event| messages += u64::from(matches!(event, Event::Message(..)))).unwrap();
-        if piece == 0 && fleet.robots()[..ROBOTS].iter().map(Robot::bytes).sum::<u64>() == said {
+        let heard: u64 = fleet.robots()[..ROBOTS].iter().map(Robot::bytes).sum();
+        if crowd.met() == ROBOTS && piece == 0 && heard == said && fleet.totals().connecting == 0 {
             break;
         }
     }
