@@ -50,6 +50,12 @@ impl<LINE: Read + Write, HEARD: FnMut(&Listener, Event<'_>)> Client<LINE, HEARD>
         &self.listener
     }
 
+    /// Goes on over another line after the one before was cut; what was heard stays.
+    pub fn reconnect(&mut self, line: LINE) {
+        self.line = line;
+        self.listener.reconnected(&mut self.heard);
+    }
+
     /// Reads the line once and takes in what came, if anything.
     ///
     /// # Errors

@@ -28,6 +28,8 @@ enum Task {
     Evaluate(command::evaluate::Arguments),
     /// Be a simulated robot at the other end of a TCP line.
     Robot(command::robot::Arguments),
+    /// Watch a robot on a line live, and tell it what to do.
+    Monitor(command::monitor::Arguments),
     /// Tell a robot on a line what to do.
     Command(command::console::Arguments),
 }
@@ -41,6 +43,7 @@ fn main() -> anyhow::Result<()> {
         Task::Replay(arguments) => command::replay::run(&arguments),
         Task::Evaluate(arguments) => command::evaluate::run(&arguments),
         Task::Robot(arguments) => command::robot::run(&arguments),
+        Task::Monitor(arguments) => command::monitor::run(&arguments),
         Task::Command(arguments) => command::console::run(&arguments),
     }
 }

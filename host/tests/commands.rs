@@ -1,5 +1,7 @@
 //! The command as a person meets it: what it prints, what it writes, and how it fails.
 
+mod monitor;
+
 use std::io::{Read, Write};
 use std::net::TcpListener;
 use std::path::Path;

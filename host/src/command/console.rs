@@ -4,10 +4,11 @@ use std::path::PathBuf;
 
 use anyhow::Context;
 use clap::{Args, Subcommand, ValueEnum};
-use toposlam::wire::{Command, Info, Picture, Setting};
+use toposlam::wire::{Command, Picture};
 use toposlam_host::client::Client;
 use toposlam_host::line::{Line, open};
 use toposlam_host::listener::{Event, Listener};
+use toposlam_host::{setting, wording};
 
 /// Arguments of `toposlam command`.
 #[derive(Args)]
@@ -48,7 +49,8 @@ enum Action {
     /// Change a setting.
     Set {
         /// Which one.
-        name: SettingName,
+        #[arg(value_parser = setting::NAMES)]
+        name: String,
         /// Its value.
         value: u16,
     },
@@ -77,42 +79,13 @@ enum Switch {
     Off,
 }
 
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-enum SettingName {
-    NoiseMm,
-    Hypotheses,
-    Moves,
-    WrongTurnPermille,
-    WrongDegreePermille,
-    EquidistanceMm,
-    LeaveMm,
-    SpeedPermille,
-    SnapshotEveryPlaces,
-}
-
-impl SettingName {
-    fn with(self, value: u16) -> Setting {
-        match self {
-            Self::NoiseMm => Setting::NoiseMm(value),
-            Self::Hypotheses => Setting::Hypotheses(value),
-            Self::Moves => Setting::Moves(value),
-            Self::WrongTurnPermille => Setting::WrongTurnPermille(value),
-            Self::WrongDegreePermille => Setting::WrongDegreePermille(value),
-            Self::EquidistanceMm => Setting::EquidistanceMm(value),
-            Self::LeaveMm => Setting::LeaveMm(value),
-            Self::SpeedPermille => Setting::SpeedPermille(value),
-            Self::SnapshotEveryPlaces => Setting::SnapshotEveryPlaces(value),
-        }
-    }
-}
-
 pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     let line = open(&arguments.line, arguments.baud)?;
     let mut client = Client::new(line, rand::random(), |_: &Listener, _: Event<'_>| {});
     client.timeout = std::time::Duration::from_millis(arguments.timeout_ms);
     client.attempts = arguments.attempts;
     match &arguments.action {
-        Action::Info => print_info(&client.info()?),
+        Action::Info => println!("{}", wording::info(&client.info()?).join("\n")),
         Action::Map => print_map(client.map()?),
         Action::Snapshot { file } => {
             let snapshot = client.snapshot()?;
@@ -125,7 +98,10 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
             println!("{} bytes restored", snapshot.len());
         }
         Action::Reset => order(&mut client, Command::Reset)?,
-        Action::Set { name, value } => order(&mut client, Command::SetConfig(name.with(*value)))?,
+        Action::Set { name, value } => {
+            let setting = setting::named(name, *value).context("there is no such setting")?;
+            order(&mut client, Command::SetConfig(setting))?;
+        }
         Action::LocaliseOnly { state } => {
             order(&mut client, Command::LocaliseOnly { on: *state == Switch::On })?;
         }
@@ -140,22 +116,6 @@ fn order(client: &mut Client<Box<dyn Line>, impl FnMut(&Listener, Event<'_>)>, c
     client.order(command)?;
     println!("done");
     Ok(())
-}
-
-fn print_info(info: &Info) {
-    let version = info.version;
-    println!("toposlam {}.{}.{}", version.major, version.minor, version.patch);
-    println!("start {}: {}", info.boot, info.reset_cause);
-    println!("up for {:.1} s", f64::from(info.uptime_ms) / 1000.0);
-    let mapping = if info.localise_only { "keeps the map and localises" } else { "maps" };
-    println!("{}{mapping}", if info.paused { "paused; otherwise it " } else { "" });
-    if let Some(vertex) = info.going_to {
-        println!("on the way to vertex {vertex}");
-    }
-    match info.stored_bytes {
-        0 => println!("no snapshot stored"),
-        bytes => println!("snapshot of {bytes} bytes stored {} places ago", info.stored_places_ago),
-    }
 }
 
 fn print_map(picture: &Picture<64>) {

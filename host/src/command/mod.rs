@@ -8,6 +8,7 @@ pub(crate) mod evaluate;
 pub(crate) mod explore;
 mod filter;
 mod hardship;
+pub(crate) mod monitor;
 mod rails;
 pub(crate) mod replay;
 pub(crate) mod robot;

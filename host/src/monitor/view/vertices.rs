@@ -1,0 +1,46 @@
+//! The map as a table.
+
+use ratatui::Frame;
+use ratatui::layout::{Constraint, Rect};
+use ratatui::style::Style;
+use ratatui::widgets::{Block, Row, Table};
+
+use super::{FAINT, HERE};
+use crate::monitor::model::Model;
+
+pub(super) fn draw(frame: &mut Frame<'_>, area: Rect, model: &Model) {
+    let picture = model.listener().picture();
+    let here = picture.location().map(|location| usize::from(location.vertex));
+    let neighbours = model.map().neighbours();
+    let rows = model.map().vertices.iter().zip(&neighbours).enumerate().skip(model.scroll());
+    let rows = rows.map(|(number, (vertex, neighbours))| {
+        let neighbours: Vec<String> = neighbours.iter().map(usize::to_string).collect();
+        let is_here = here == Some(number);
+        let cells = [
+            format!("{}{number}", if is_here { "@" } else { " " }),
+            vertex.radius_mm.to_string(),
+            vertex.visits.to_string(),
+            permille_at(model, number).map_or(String::new(), |permille| permille.to_string()),
+            neighbours.join(" "),
+        ];
+        Row::new(cells).style(if is_here { HERE } else { Style::new() })
+    });
+    let widths = [
+        Constraint::Length(3),
+        Constraint::Length(4),
+        Constraint::Length(4),
+        Constraint::Length(4),
+        Constraint::Min(4),
+    ];
+    let table = Table::new(rows, widths)
+        .header(Row::new([" no", "mm", "seen", "‰", "edges to"]).style(FAINT))
+        .block(Block::bordered().title("vertices"));
+    frame.render_widget(table, area);
+}
+
+/// The probability that the robot is at a vertex, in thousandths, when it was told.
+pub(super) fn permille_at(model: &Model, number: usize) -> Option<u16> {
+    let belief = model.listener().picture().belief()?;
+    let place = belief.places.as_slice().iter().find(|place| usize::from(place.vertex) == number)?;
+    Some(place.permille)
+}
