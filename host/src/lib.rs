@@ -7,7 +7,7 @@
 //! own code, [`injector`] makes the faults that it meets, and [`soak`] lets it live with them for a day. [`emulator`] runs the
 //! firmware with such frames, and
 //! [`chip`] answers for the chips on its sensor bus; [`listener`] understands what a robot says, [`client`] tells one on a [`mod@line`] what to do, and [`topology`] is its map as
-//! plain data; [`broadcast`] is the robot's end of such a line. [`monitor`] shows all that live in a terminal, with
+//! plain data; [`broadcast`] is the robot's end of such a line. [`monitor`] shows all that live in a terminal, [`serve`] in browsers, with
 //! [`wording`], [`mod@setting`] and [`mod@json`] for what is said and set. [`picture`] draws a map over its floor plan, and [`evaluation`]
 //! measures how often maps are right.
 
@@ -28,6 +28,7 @@ pub mod monitor;
 pub mod nearness;
 pub mod picture;
 pub mod recording;
+pub mod serve;
 pub mod setting;
 pub mod soak;
 pub mod topology;

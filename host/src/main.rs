@@ -30,6 +30,8 @@ enum Task {
     Robot(command::robot::Arguments),
     /// Watch a robot on a line live, and tell it what to do.
     Monitor(command::monitor::Arguments),
+    /// Show the live map of a robot on a line in browsers.
+    Serve(command::serve::Arguments),
     /// Tell a robot on a line what to do.
     Command(command::console::Arguments),
 }
@@ -44,6 +46,7 @@ fn main() -> anyhow::Result<()> {
         Task::Evaluate(arguments) => command::evaluate::run(&arguments),
         Task::Robot(arguments) => command::robot::run(&arguments),
         Task::Monitor(arguments) => command::monitor::run(&arguments),
+        Task::Serve(arguments) => command::serve::run(&arguments),
         Task::Command(arguments) => command::console::run(&arguments),
     }
 }

@@ -12,5 +12,6 @@ pub(crate) mod monitor;
 mod rails;
 pub(crate) mod replay;
 pub(crate) mod robot;
+pub(crate) mod serve;
 pub(crate) mod simulate;
 pub(crate) mod soak;
