@@ -25,8 +25,8 @@ pub(crate) struct Arguments {
 pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     let Arguments { line, baud, listen, names } = arguments;
     let options = Options { names: names.clone(), ..Options::default() };
-    let server = Server::bind(listen, options, &Watch::new(line).state())
-        .with_context(|| format!("serving at {listen}"))?;
+    let server =
+        Server::bind(listen, options, &Watch::new(line).state()).with_context(|| format!("serving at {listen}"))?;
     let address = server.address();
     if !address.ip().to_canonical().is_loopback() {
         eprintln!("warning: whoever reaches {address} sees the robot's map: there is no password and no encryption");

@@ -171,7 +171,8 @@ mod tests {
         for host in ["127.0.0.1", "127.0.0.1:8080", "localhost:8080", "LocalHost", "[::ffff:127.0.0.1]:80"] {
             assert!(is_ours(host, loopback, &[]) && is_ours(host, mapped, &[]), "{host}");
         }
-        for host in ["", "evil.example", "evil.example:8080", "localhost.evil.example", "192.0.2.1:8080", "[::1]", "::"] {
+        for host in ["", "evil.example", "evil.example:8080", "localhost.evil.example", "192.0.2.1:8080", "[::1]", "::"]
+        {
             assert!(!is_ours(host, loopback, &[]), "{host}");
         }
         assert!(is_ours("[::1]", "::1".parse().unwrap(), &[]));

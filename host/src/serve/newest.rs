@@ -91,7 +91,8 @@ impl Newest {
 
     /// Waits for what was not seen yet.
     pub(super) fn wait(&self, seen: &mut Seen, patience: Duration) -> Change {
-        let is_old = |inner: &mut Inner| !inner.closed && inner.map.number == seen.map && inner.live.number == seen.live;
+        let is_old =
+            |inner: &mut Inner| !inner.closed && inner.map.number == seen.map && inner.live.number == seen.live;
         let waited = self.changed.wait_timeout_while(self.lock(), patience, is_old);
         let (inner, timeout) = waited.unwrap_or_else(PoisonError::into_inner);
         if inner.closed {

@@ -115,7 +115,10 @@ fn understanding(listener: &Listener) -> Value {
 
 fn faults(listener: &Listener) -> Vec<Value> {
     let counts = FaultKind::ALL.iter().map(|&kind| (kind, listener.picture().fault(kind)));
-    counts.filter(|&(_, count)| count > 0).map(|(kind, count)| json!({"kind": format!("{kind:?}"), "count": count})).collect()
+    counts
+        .filter(|&(_, count)| count > 0)
+        .map(|(kind, count)| json!({"kind": format!("{kind:?}"), "count": count}))
+        .collect()
 }
 
 fn finite_mm(distance_mm: u16) -> Option<u16> {
