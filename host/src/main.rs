@@ -44,6 +44,8 @@ enum Task {
     /// Tell an MQTT broker all that a robot on a line says.
     #[cfg(feature = "mqtt")]
     Publish(command::publish::Arguments),
+    /// Show the live map of a robot on a line in browsers.
+    Serve(command::serve::Arguments),
     /// Tell a robot on a line what to do.
     Command(command::console::Arguments),
 }
@@ -65,6 +67,7 @@ fn main() -> anyhow::Result<()> {
         Task::Robots(arguments) => command::robots::run(&arguments),
         #[cfg(feature = "mqtt")]
         Task::Publish(arguments) => command::publish::run(&arguments),
+        Task::Serve(arguments) => command::serve::run(&arguments),
         Task::Command(arguments) => command::console::run(&arguments),
     }
 }

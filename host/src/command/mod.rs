@@ -20,5 +20,6 @@ pub(crate) mod record;
 pub(crate) mod replay;
 pub(crate) mod robot;
 pub(crate) mod robots;
+pub(crate) mod serve;
 pub(crate) mod simulate;
 pub(crate) mod soak;

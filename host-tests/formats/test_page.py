@@ -1,0 +1,217 @@
+"""A real browser shows what a robot says: the page of `toposlam serve` in Chromium.
+
+`TOPOSLAM=path/to/toposlam python3 -m unittest test_page`, with what requirements-page.txt names, and Debian's packages chromium and
+chromium-driver. With SCREENSHOT=FILE.png the page is also written to that file.
+"""
+
+from __future__ import annotations
+
+import os
+import re
+import shutil
+import socket
+import subprocess
+import time
+import unittest
+import zlib
+from pathlib import Path
+
+REPOSITORY = Path(__file__).resolve().parents[2]
+TOPOSLAM = os.environ.get("TOPOSLAM", str(REPOSITORY / "target" / "debug" / "toposlam"))
+CHROMIUM, DRIVER = shutil.which("chromium"), shutil.which("chromedriver")
+SCREENSHOT = os.environ.get("SCREENSHOT")
+# Longer than anything takes; who waits so long has failed.
+FOREVER_S = 120
+
+missing = [name for name, found in (("chromium", CHROMIUM), ("chromedriver", DRIVER)) if found is None]
+if not Path(TOPOSLAM).exists():
+    missing.append(TOPOSLAM)
+try:
+    from selenium import webdriver
+    from selenium.webdriver.common.by import By
+    from selenium.webdriver.support.wait import WebDriverWait
+except ImportError as error:
+    missing.append(str(error.name))
+
+
+def setUpModule() -> None:
+    if missing:
+        if os.environ.get("CI") == "true":
+            raise RuntimeError(f"missing: {', '.join(missing)}")
+        print(f"SKIPPED: no browser has shown the page; missing: {', '.join(missing)}")
+        raise unittest.SkipTest("something is missing")
+
+
+class Program:
+    """A `toposlam` that goes on until it is stopped; `told` is the last word of its first line."""
+
+    def __init__(self, *arguments: str) -> None:
+        self.process = subprocess.Popen([TOPOSLAM, *arguments], stdout=subprocess.PIPE, text=True)
+        self.told = self.process.stdout.readline().split()[-1]
+
+    def stop(self) -> None:
+        self.process.kill()
+        self.process.wait()
+        self.process.stdout.close()
+
+
+def robot(address: str = "127.0.0.1:0") -> Program:
+    return Program("robot", "--speed", "20", "--listen", address)
+
+
+def serve(line: str, address: str = "127.0.0.1:0") -> Program:
+    return Program("serve", line, "--listen", address)
+
+
+def command(line: str, *arguments: str) -> str:
+    done = subprocess.run([TOPOSLAM, "command", line, *arguments], capture_output=True, text=True, timeout=FOREVER_S, check=True)
+    return done.stdout
+
+
+def cobs(data: bytes) -> bytes:
+    """Consistent overhead byte stuffing of less than 254 bytes, with the closing zero (docs/wire.md, Frame)."""
+    return b"".join(bytes([len(part) + 1]) + part for part in data.split(b"\0")) + b"\0"
+
+
+def frame(sequence: int, payload: bytes) -> bytes:
+    body = bytes([1]) + sequence.to_bytes(2, "little") + payload
+    return cobs(body + zlib.crc32(body).to_bytes(4, "little"))
+
+
+def varint(value: int) -> bytes:
+    return bytes([value]) if value < 128 else bytes([value & 0x7F | 0x80]) + varint(value >> 7)
+
+
+def hello(version: int) -> bytes:
+    """A robot of a protocol version, with four sonars (docs/wire.md, Hello)."""
+    return bytes([0]) + varint(version) + varint(7) + bytes([1, 1, 1, 16, 10]) + varint(400) + bytes([5, 2, 4])
+
+
+class Page(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls) -> None:
+        options = webdriver.ChromeOptions()
+        options.binary_location = CHROMIUM
+        for argument in ("--headless=new", "--no-sandbox", "--disable-gpu", "--disable-dev-shm-usage", "--window-size=1200,860"):
+            options.add_argument(argument)
+        options.set_capability("goog:loggingPrefs", {"browser": "ALL"})
+        cls.browser = webdriver.Chrome(options=options, service=webdriver.ChromeService(executable_path=DRIVER))
+        cls.addClassCleanup(cls.browser.quit)
+
+    def setUp(self) -> None:
+        # Also what a test that failed has left.
+        self.browser.get("about:blank")
+        self.browser.get_log("browser")
+
+    def start(self, program: Program) -> Program:
+        self.addCleanup(program.stop)
+        return program
+
+    def count(self, selector: str) -> int:
+        return self.browser.execute_script("return document.querySelectorAll(arguments[0]).length", selector)
+
+    def text(self, name: str) -> str:
+        return self.browser.execute_script("return document.getElementById(arguments[0]).textContent", name)
+
+    def banners(self) -> set[str]:
+        shown = self.browser.execute_script("return [...document.querySelectorAll('.banner')].filter((b) => b.checkVisibility()).map((b) => b.id)")
+        return set(shown)
+
+    def wait(self, what: str, condition) -> None:
+        WebDriverWait(self.browser, FOREVER_S, poll_frequency=0.1).until(lambda _: condition(), what)
+
+    def test_it_draws_the_map_of_a_robot_that_explores(self) -> None:
+        line = self.start(robot()).told
+        self.browser.get(self.start(serve(line)).told)
+        self.wait("ten vertices", lambda: self.count("#map .vertex") >= 10)
+        if SCREENSHOT:
+            time.sleep(0.5)
+            self.browser.save_screenshot(SCREENSHOT)
+        # From here on it stands, so that its map stays as it is while it is compared.
+        command(line, "pause", "on")
+        heard = command(line, "map")
+        vertices, edges = map(int, re.search(r"map: (\d+) vertices, (\d+) edges", heard).groups())
+        radii = [int(radius) for radius in re.findall(r"vertex +\d+: radius +(\d+) mm", heard)]
+        names = sorted(re.search(r"edges: (.*)", heard).group(1).split())
+        here = re.search(r"at vertex (\d+)", heard).group(1)
+        self.assertGreaterEqual(vertices, 10)
+
+        def is_drawn() -> bool:
+            return (
+                self.count("#map .vertex") == vertices == len(radii)
+                and sorted(self.browser.execute_script("return [...document.querySelectorAll('#map .edge')].map((e) => e.dataset.edge)")) == names
+                and self.browser.execute_script("return [...document.querySelectorAll('#map .here')].map((v) => v.dataset.vertex)") == [here]
+            )
+
+        self.wait(heard, is_drawn)
+        self.assertEqual(len(names), edges)
+        labels = self.browser.execute_script("return [...document.querySelectorAll('#map .label')].map((label) => label.textContent)")
+        self.assertEqual([int(label.split(" mm")[0]) for label in labels], radii)
+        self.assertEqual(self.count("#table tr"), vertices)
+        self.assertEqual(self.banners(), set())
+        self.assertIn(f"{vertices} vertices, {edges} edges; the robot is at vertex {here}", self.text("summary"))
+        self.assertTrue(self.browser.find_element(By.ID, "map").accessible_name.startswith(f"The map: {vertices} vertices"))
+        self.assertRegex(self.text("belief"), r"this map\d+\.\d %its rivals\d+\.\d %consistency(\d+ mm|infinite)")
+        self.assertIn("stands", self.text("drive"))
+        # The policy of the page lets everything through that the page does.
+        self.assertEqual(self.browser.get_log("browser"), [])
+
+        for name in ("number", "radius", "probability"):
+            self.browser.find_element(By.NAME, name).click()
+        self.wait("no labels", lambda: self.count("#map text") == 0)
+        self.browser.find_element(By.NAME, "visits").click()
+        self.wait("visits", lambda: self.count("#map .label") == vertices)
+
+    def test_it_says_when_the_robot_or_the_server_is_gone_and_goes_on_when_they_are_back(self) -> None:
+        first_robot = self.start(robot())
+        first_server = self.start(serve(first_robot.told))
+        line, address = first_robot.told.removeprefix("tcp:"), first_server.told.removeprefix("http://").rstrip("/")
+        self.browser.get(first_server.told)
+        self.wait("a robot", lambda: self.text("connection") == "connected" and self.count("#map .vertex") > 0)
+        self.assertEqual(self.banners(), set())
+        first_robot.stop()
+        self.wait("the line is cut", lambda: self.banners() == {"banner-line"})
+        self.assertIn("No line to the robot: ", self.text("banner-line"))
+        self.assertGreater(self.count("#map .vertex"), 0, "what was heard stays")
+        self.start(robot(line))
+        self.wait("the line is back", lambda: self.banners() == set())
+        first_server.stop()
+        self.wait("the server is gone", lambda: self.banners() == {"banner-server"})
+        self.start(serve(f"tcp:{line}", address))
+        self.wait("the server is back", lambda: self.banners() == set() and self.text("connection") == "connected")
+
+    def test_it_shows_the_ring_and_the_faults_and_does_not_trust_a_robot_of_another_version(self) -> None:
+        damaged = bytearray(frame(2, bytes([8, 1, 1])))
+        damaged[-3] ^= 0x80
+        ring = bytes([10, 7, 4]) + varint(502) + bytes([1, 0]) + varint(1002)
+        said = frame(0, hello(99)) + frame(1, bytes([8, 0, 5])) + bytes(damaged) + frame(3, ring)
+        with socket.create_server(("127.0.0.1", 0)) as port:
+            self.browser.get(self.start(serve(f"tcp:127.0.0.1:{port.getsockname()[1]}")).told)
+            with port.accept()[0] as robots_end:
+                robots_end.sendall(said)
+                self.wait("another version", lambda: self.banners() == {"banner-version"})
+                self.assertIn("protocol version 99", self.text("banner-version"))
+                self.wait("the ring", lambda: [self.count(f"#ring .{kind}") for kind in ("echo", "silence", "dead")] == [2, 1, 1])
+                self.assertIn("500 mm, silence, dead, 1000 mm", self.browser.find_element(By.ID, "ring").accessible_name)
+                self.assertIn("SonarSilent5", self.text("health"))
+                self.assertIn("frames lost1damaged1", self.text("health"))
+
+    def test_a_tab_that_slept_shows_the_newest_state_and_the_colours_are_those_that_the_system_prefers(self) -> None:
+        self.browser.get(self.start(serve(self.start(robot()).told)).told)
+        self.wait("a robot", lambda: self.count("#map .vertex") > 0)
+        heard = lambda: int(re.search(r"frames heard(\d+)", self.text("health")).group(1))
+        self.browser.execute_cdp_cmd("Page.setWebLifecycleState", {"state": "frozen"})
+        time.sleep(2)
+        self.browser.execute_cdp_cmd("Page.setWebLifecycleState", {"state": "active"})
+        before = heard()
+        self.wait("it goes on", lambda: heard() > before + 100)
+        self.assertEqual(self.banners(), set())
+        grounds = set()
+        for scheme in ("light", "dark"):
+            self.browser.execute_cdp_cmd("Emulation.setEmulatedMedia", {"features": [{"name": "prefers-color-scheme", "value": scheme}]})
+            grounds.add(self.browser.execute_script("return getComputedStyle(document.body).backgroundColor"))
+        self.assertEqual(grounds, {"rgb(246, 246, 243)", "rgb(21, 23, 26)"})
+
+
+if __name__ == "__main__":
+    unittest.main()
