@@ -11,12 +11,13 @@ use toposlam_host::export;
 use toposlam_host::layout::Layout;
 use toposlam_host::line;
 use toposlam_host::listener::{Event, Listener, Understanding};
+use toposlam_host::log::{self, LogError};
 
 /// Arguments of `toposlam export`.
 #[derive(Args)]
 pub(crate) struct Arguments {
-    /// Where the map comes from: a robot's line (a serial port, or tcp:HOST:PORT), a file of the bytes that a robot sent, or - for
-    /// such bytes from the standard input.
+    /// Where the map comes from: a robot's line (a serial port, or tcp:HOST:PORT), a recording of `record` (FILE.mcap), a
+    /// file of the bytes that a robot sent, or - for such bytes from the standard input.
     source: String,
     /// The format.
     #[arg(long)]
@@ -75,7 +76,11 @@ fn listen(source: &str, baud: u32) -> anyhow::Result<Listener> {
     if source == "-" {
         return recorded(io::stdin().lock()).context("reading the standard input");
     }
-    if Path::new(source).is_file() {
+    let path = Path::new(source);
+    if path.extension().is_some_and(|extension| extension == "mcap") {
+        return replayed(path).with_context(|| format!("reading {source}"));
+    }
+    if path.is_file() {
         let file = File::open(source).with_context(|| format!("opening {source}"))?;
         return recorded(file).with_context(|| format!("reading {source}"));
     }
@@ -97,8 +102,22 @@ fn recorded(mut bytes: impl Read) -> io::Result<Listener> {
             Err(error) => return Err(error),
         }
     }
+    complain_of_gaps(&listener);
+    Ok(listener)
+}
+
+/// What is known at the end of a recording.
+fn replayed(path: &Path) -> Result<Listener, LogError> {
+    let mut listener = Listener::new();
+    for bytes in log::frames(path)? {
+        listener.feed(&bytes?, |_, _| ());
+    }
+    complain_of_gaps(&listener);
+    Ok(listener)
+}
+
+fn complain_of_gaps(listener: &Listener) {
     if !listener.picture().is_complete() || !listener.picture().is_converged() {
         eprintln!("the map was not heard whole: vertices or edges may be missing");
     }
-    Ok(listener)
 }

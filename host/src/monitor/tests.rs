@@ -104,7 +104,7 @@ fn a_wide_screen_shows_all_that_a_robot_says() {
     assert!(screen.contains(&format!("consistency {} mm", evidence.consistency_mm)), "{screen}");
     assert!(screen.contains(&format!("worst {} mm", picture.worst().unwrap().distance_mm)), "{screen}");
     for word in
-        ["as the robot has it", "heading", "no faults", " 0 lost, 0 corrupt", "turns, stack", "no ring was heard"]
+        ["as the robot has it", "heading", "no faults", " 0 lost, 0 corrupt", "turns, stack", "rim at"]
     {
         assert!(screen.contains(word), "{word}\n{screen}");
     }
@@ -119,7 +119,7 @@ fn a_small_screen_shows_one_pane_after_the_other_and_no_size_is_too_small() {
     }
     let seen = radii.iter().filter(|radius| screen.contains(&radius.to_string())).count();
     assert!(2 * seen > radii.len(), "labels that are close hide each other, but not most\n{screen}");
-    for title in ["edges to", "no ring was heard", "what it does", "map:"] {
+    for title in ["edges to", "rim at", "what it does", "map:"] {
         assert_eq!(watch.press(KeyCode::Tab), None);
         assert!(watch.screen(40, 10).contains(title), "{title}");
     }
