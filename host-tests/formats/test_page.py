@@ -21,7 +21,8 @@ TOPOSLAM = os.environ.get("TOPOSLAM", str(REPOSITORY / "target" / "debug" / "top
 CHROMIUM, DRIVER = shutil.which("chromium"), shutil.which("chromedriver")
 SCREENSHOT = os.environ.get("SCREENSHOT")
 # Longer than anything takes; who waits so long has failed.
-FOREVER_S = 120
+FOREVER_S = 60
+WINDOW = 1200, 1000
 
 missing = [name for name, found in (("chromium", CHROMIUM), ("chromedriver", DRIVER)) if found is None]
 if not Path(TOPOSLAM).exists():
@@ -56,7 +57,7 @@ class Program:
 
 
 def robot(address: str = "127.0.0.1:0") -> Program:
-    return Program("robot", "--speed", "20", "--listen", address)
+    return Program("robot", "--speed", "60", "--listen", address)
 
 
 def serve(line: str, address: str = "127.0.0.1:0") -> Program:
@@ -92,7 +93,7 @@ class Page(unittest.TestCase):
     def setUpClass(cls) -> None:
         options = webdriver.ChromeOptions()
         options.binary_location = CHROMIUM
-        for argument in ("--headless=new", "--no-sandbox", "--disable-gpu", "--disable-dev-shm-usage", "--window-size=1200,860"):
+        for argument in ("--headless=new", "--no-sandbox", "--disable-gpu", "--disable-dev-shm-usage", "--window-size=%d,%d" % WINDOW):
             options.add_argument(argument)
         options.set_capability("goog:loggingPrefs", {"browser": "ALL"})
         cls.browser = webdriver.Chrome(options=options, service=webdriver.ChromeService(executable_path=DRIVER))
@@ -117,8 +118,8 @@ class Page(unittest.TestCase):
         shown = self.browser.execute_script("return [...document.querySelectorAll('.banner')].filter((b) => b.checkVisibility()).map((b) => b.id)")
         return set(shown)
 
-    def wait(self, what: str, condition) -> None:
-        WebDriverWait(self.browser, FOREVER_S, poll_frequency=0.1).until(lambda _: condition(), what)
+    def wait(self, what: str, condition):
+        return WebDriverWait(self.browser, FOREVER_S, poll_frequency=0.1).until(lambda _: condition(), what)
 
     def test_it_draws_the_map_of_a_robot_that_explores(self) -> None:
         line = self.start(robot()).told
@@ -129,7 +130,8 @@ class Page(unittest.TestCase):
             self.browser.save_screenshot(SCREENSHOT)
         # From here on it stands, so that its map stays as it is while it is compared.
         command(line, "pause", "on")
-        heard = command(line, "map")
+        # Where it is comes round less often than its map.
+        heard = self.wait("a place", lambda: text if "at vertex" in (text := command(line, "map")) else None)
         vertices, edges = map(int, re.search(r"map: (\d+) vertices, (\d+) edges", heard).groups())
         radii = [int(radius) for radius in re.findall(r"vertex +\d+: radius +(\d+) mm", heard)]
         names = sorted(re.search(r"edges: (.*)", heard).group(1).split())
@@ -152,7 +154,7 @@ class Page(unittest.TestCase):
         self.assertIn(f"{vertices} vertices, {edges} edges; the robot is at vertex {here}", self.text("summary"))
         self.assertTrue(self.browser.find_element(By.ID, "map").accessible_name.startswith(f"The map: {vertices} vertices"))
         self.assertRegex(self.text("belief"), r"this map\d+\.\d %its rivals\d+\.\d %consistency(\d+ mm|infinite)")
-        self.assertIn("stands", self.text("drive"))
+        self.assertIn("speed0.0 %", self.text("drive"))
         # The policy of the page lets everything through that the page does.
         self.assertEqual(self.browser.get_log("browser"), [])
 
@@ -196,16 +198,33 @@ class Page(unittest.TestCase):
                 self.assertIn("SonarSilent5", self.text("health"))
                 self.assertIn("frames lost1damaged1", self.text("health"))
 
+    def test_it_goes_on_to_show_what_the_standard_input_told_and_warns_when_others_can_look(self) -> None:
+        arguments = [TOPOSLAM, "serve", "-", "--listen", "0.0.0.0:0"]
+        with subprocess.Popen(arguments, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=False) as program:
+            self.addCleanup(program.kill)
+            # An edge from 0 to 1 (docs/wire.md, Edge).
+            program.stdin.write(frame(0, bytes([4, 0, 1, 1])))
+            program.stdin.close()
+            self.assertIn(b"warning: whoever reaches 0.0.0.0:", program.stderr.readline())
+            self.browser.get(program.stdout.readline().split()[-1].decode())
+            self.wait("the end", lambda: self.text("connection") == "the input has ended")
+            self.wait("two vertices", lambda: (self.count("#map .vertex"), self.count("#map .edge")) == (2, 1))
+            program.kill()
+
     def test_a_tab_that_slept_shows_the_newest_state_and_the_colours_are_those_that_the_system_prefers(self) -> None:
         self.browser.get(self.start(serve(self.start(robot()).told)).told)
         self.wait("a robot", lambda: self.count("#map .vertex") > 0)
         heard = lambda: int(re.search(r"frames heard(\d+)", self.text("health")).group(1))
+        self.browser.minimize_window()
+        asleep = heard()
         self.browser.execute_cdp_cmd("Page.setWebLifecycleState", {"state": "frozen"})
         time.sleep(2)
+        self.assertLess(heard(), asleep + 100, "nothing is drawn that is not seen")
         self.browser.execute_cdp_cmd("Page.setWebLifecycleState", {"state": "active"})
-        before = heard()
-        self.wait("it goes on", lambda: heard() > before + 100)
+        self.browser.set_window_rect(0, 0, *WINDOW)
+        self.wait("it goes on", lambda: heard() > asleep + 500)
         self.assertEqual(self.banners(), set())
+        self.addCleanup(self.browser.execute_cdp_cmd, "Emulation.setEmulatedMedia", {"features": []})
         grounds = set()
         for scheme in ("light", "dark"):
             self.browser.execute_cdp_cmd("Emulation.setEmulatedMedia", {"features": [{"name": "prefers-color-scheme", "value": scheme}]})

@@ -31,7 +31,11 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     if !address.ip().to_canonical().is_loopback() {
         eprintln!("warning: whoever reaches {address} sees the robot's map: there is no password and no encryption");
     }
-    println!("the map is at http://{address}/");
+    if address.ip().is_unspecified() {
+        println!("the map is at http://localhost:{}/", address.port());
+    } else {
+        println!("the map is at http://{address}/");
+    }
     follow(line, *baud, link::Options::default(), &server);
     eprintln!("the input has ended; the page stays until this program is stopped");
     loop {
