@@ -103,9 +103,7 @@ fn a_wide_screen_shows_all_that_a_robot_says() {
     let evidence = picture.evidence().unwrap();
     assert!(screen.contains(&format!("consistency {} mm", evidence.consistency_mm)), "{screen}");
     assert!(screen.contains(&format!("worst {} mm", picture.worst().unwrap().distance_mm)), "{screen}");
-    for word in
-        ["as the robot has it", "heading", "no faults", " 0 lost, 0 corrupt", "turns, stack", "rim at"]
-    {
+    for word in ["as the robot has it", "heading", "no faults", " 0 lost, 0 corrupt", "turns, stack", "rim at"] {
         assert!(screen.contains(word), "{word}\n{screen}");
     }
 }
