@@ -7,9 +7,9 @@
 //! own code, [`injector`] makes the faults that it meets, and [`soak`] lets it live with them for a day. [`emulator`] runs the
 //! firmware with such frames, and
 //! [`chip`] answers for the chips on its sensor bus; [`listener`] understands what a robot says, [`client`] tells one on a [`mod@line`] what to do, and [`topology`] is its map as
-//! plain data; [`broadcast`] is the robot's end of such a line, and [`log`] records one. [`monitor`] shows all that live in a terminal, [`fleet`]
-//! listens to a thousand robots at once, and `publish` (feature `mqtt`) tells a broker, with
-//! [`wording`], [`mod@setting`] and [`mod@json`] for what is said and set. [`picture`] draws a map over its floor plan, and [`evaluation`]
+//! plain data; [`broadcast`] is the robot's end of such a line, and [`log`] records one. [`monitor`] shows all that live in a
+//! terminal, with [`wording`], [`mod@setting`] and [`mod@json`] for what is said and set; [`fleet`] listens to a thousand robots at once,
+//! and `publish` (feature `mqtt`) tells a broker. [`picture`] draws a map over its floor plan, and [`evaluation`]
 //! measures how often maps are right.
 
 pub mod broadcast;
