@@ -9,8 +9,8 @@
 //!
 //! Messages come from a robot. [`mod@line`] is the way to one and [`broadcast`] its end of it; [`listener`] understands what it says,
 //! [`client`] tells it what to do, [`topology`] is its map as plain data and [`layout`] where to draw that. [`export`] writes the map
-//! for other programs, [`monitor`] shows all in a terminal, [`serve`] in browsers, and [`log`] records it, with [`wording`], [`mod@setting`] and [`mod@json`]
-//! for what is said and set. [`fleet`] listens to a thousand robots at once, and `publish` (feature `mqtt`) tells a broker.
+//! for other programs, [`monitor`] shows all in a terminal, [`serve`] in browsers, and [`log`] records it, with [`wording`],
+//! [`mod@setting`] and [`mod@json`] for what is said and set. [`fleet`] listens to a thousand robots at once, and `publish` (feature `mqtt`) tells a broker.
 //!
 //! Maps are right or wrong: [`picture`] draws one over its floor plan, and [`evaluation`] measures how often they are right.
 

@@ -36,6 +36,14 @@ fn simulate_prints_a_line_for_each_place_and_draws_the_map() {
 }
 
 #[test]
+fn a_fleet_of_another_process_is_heard_without_loss_and_its_cost_told() {
+    let text = printed(&toposlam(&["fleet", "--simulate", "3", "--seconds", "1", "--speed", "0"]));
+    assert!(text.contains("3 connected, 0 closed, 0 failed"), "{text}");
+    assert!(text.lines().any(|line| line.starts_with("in all: ") && line.ends_with("; 0 frames lost, 0 damaged")));
+    assert!(!text.contains(" 0 messages, 0 bytes"), "{text}");
+}
+
+#[test]
 fn the_same_seed_gives_the_same_drive_and_another_seed_another() {
     let drive = |seed| printed(&toposlam(&["simulate", "--plan", "ring", "--places", "5", "--seed", seed]));
     assert_eq!(drive("3"), drive("3"));

@@ -53,7 +53,6 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     let resident_before = resident_bytes();
     for (name, address) in &lines {
         fleet.connect(name, address);
-        fleet.listen(Duration::ZERO, |_, _, _| ())?;
     }
     let began = Instant::now();
     while fleet.totals().connecting > 0 && began.elapsed() < CONNECTING && !interrupt.is_told() {

@@ -1,7 +1,7 @@
 //! What this process has used of the computer, and what it may use.
 
 use std::io;
-use std::net::TcpStream;
+use std::net::{TcpListener, TcpStream};
 use std::time::Duration;
 
 /// What the system may hold for a line that is not read yet: some ten seconds of a robot at its normal pace.
@@ -38,6 +38,16 @@ pub fn allow_many_connections() -> io::Result<()> {
         let limit = getrlimit(Resource::Nofile);
         setrlimit(Resource::Nofile, Rlimit { current: limit.maximum, maximum: limit.maximum })?;
     }
+    Ok(())
+}
+
+/// Lets that many connect before the first of them is accepted. The system may drop what is beyond, and with the usual 128 some of a
+/// thousand believe that they are connected and hear nothing.
+pub(super) fn expect_many(port: &TcpListener, count: usize) -> io::Result<()> {
+    #[cfg(unix)]
+    rustix::net::listen(port, i32::try_from(count).unwrap_or(i32::MAX))?;
+    #[cfg(not(unix))]
+    let _ = (port, count);
     Ok(())
 }
 

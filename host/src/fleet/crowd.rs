@@ -131,6 +131,7 @@ impl Crowd {
         assert!(!lives.is_empty() && lives.iter().all(|life| life.frames() > 0), "a robot needs something to say");
         let port = TcpListener::bind(address)?;
         port.set_nonblocking(true)?;
+        cost::expect_many(&port, count)?;
         Ok(Self { port, lives, count, afterwards, speakers: Vec::new() })
     }
 
