@@ -1,6 +1,18 @@
 //! The reference robot: the capacities and settings that its firmware, the bench and a host's repetition of a run share.
 //!
 //! A host that feeds the same frames into the same stages gets the same map, bit for bit.
+//!
+//! ```
+//! use toposlam::place::PlaceDetector;
+//! use toposlam::reference::{self, SONARS};
+//! use toposlam::ring::{Echo, RingFrame, RingGeometry};
+//!
+//! let mut detector: reference::Detector = PlaceDetector::new();
+//! detector.start(reference::PLACE, RingGeometry::even())?;
+//! // Silence all around is no place.
+//! assert!(detector.observe(&RingFrame { echoes: [Echo::Silence; SONARS] }).is_none());
+//! # Ok::<(), toposlam::place::PlaceConfigError>(())
+//! ```
 
 use crate::{
     Config, Direction, PaperFilter, RobustConfig, RobustFilter, place::PlaceConfig, place::PlaceDetector,

@@ -13,6 +13,29 @@
 //! time, however many of its sensors are dead. Sensors come from the factory with one address for all;
 //! [`change_srf08_address`] and [`change_maxbotix_address`] set them apart.
 //!
+//! Whatever gives a frame is a ring; here one that hears the same again and again:
+//!
+//! ```
+//! use toposlam::FaultCounters;
+//! use toposlam::ring::{Echo, RingFrame};
+//! use toposlam::sonar::{SonarError, SonarRing};
+//!
+//! struct Constant(u16);
+//!
+//! impl SonarRing<8> for Constant {
+//!     fn read(&mut self, _faults: &mut FaultCounters) -> RingFrame<8> {
+//!         RingFrame { echoes: [Echo::Range { range_mm: self.0 }; 8] }
+//!     }
+//!
+//!     fn last_error(&self) -> Option<SonarError> {
+//!         None
+//!     }
+//! }
+//!
+//! let mut faults = FaultCounters::new();
+//! assert_eq!(Constant(1200).read(&mut faults).dead_sensors().count(), 0);
+//! ```
+//!
 //! # VL53L1X
 //!
 //! There is no driver for this time-of-flight sensor, because no crate fits. Of those on crates.io, `vl53l1x` 1.2.0 needs
