@@ -233,7 +233,8 @@ class Understanding(unittest.TestCase):
         hello = next(event.message for event in Decoder().feed(exploration()) if isinstance(event.message, Hello))
         self.assertIsNone(hello.complaint())
         newer = dataclasses.replace(hello, protocol_version=hello.protocol_version + 1, schema_hash=7)
-        self.assertIn("version 4, this program 3", newer.complaint())
+        ours = toposlam_stream.PROTOCOL_VERSION
+        self.assertIn(f"version {ours + 1}, this program {ours}", newer.complaint())
         other = dataclasses.replace(hello, schema_hash=7)
         self.assertIn("not understood", other.complaint())
         self.assertIn("0x0000000000000007", other.complaint())

@@ -10,6 +10,7 @@ mod robot;
 mod samples;
 mod schema;
 mod specification;
+mod streams;
 
 use samples::{largest, typical};
 use toposlam::wire::{Arrival, Decoder, Encoder, Header, MAX_FRAME_BYTES, Message, Payload, Progress};

@@ -1,4 +1,4 @@
-//! One typical and one largest message and request of every kind.
+//! One typical and one largest message and request of every kind, and what lies at other ends.
 
 use toposlam::Fingerprint;
 use toposlam::ring::Echo;
@@ -217,4 +217,70 @@ pub(crate) fn largest() -> Vec<Message> {
 
 fn largest_reply(outcome: Outcome) -> Message {
     Message::Reply(Reply { request: u16::MAX, outcome })
+}
+
+/// The least of every number, no element of any list, the other end of what is signed, and every kind that is one byte.
+pub(crate) fn extremes() -> Vec<Message> {
+    let reply = |outcome| Message::Reply(Reply { request: 0, outcome });
+    let evidence = |place_index, logarithm| {
+        Message::Evidence(Evidence {
+            place_index,
+            consistency_mm: 0,
+            ln_label_q16: logarithm,
+            ln_consistency_q16: logarithm,
+            ln_size_q16: logarithm,
+            lead_q16: logarithm,
+            distinct_hypotheses: 0,
+        })
+    };
+    let drive =
+        |state, value| Message::Drive(Drive { frame_index: 0x80, heading_mrad: value, speed_permille: value, state });
+    let info = Info {
+        version: Version { major: 0, minor: 0, patch: 0 },
+        boot: 0,
+        reset_cause: ResetCause::Unknown,
+        uptime_ms: 0,
+        paused: false,
+        localise_only: false,
+        going_to: None,
+        stored_bytes: 0,
+        stored_places_ago: 0,
+    };
+    let Message::Hello(hello) = typical()[0] else { panic!("the first sample is a Hello") };
+    let ring = [Echo::Dead, Echo::Silence, Echo::Range { range_mm: 0 }, Echo::Range { range_mm: 0x7E }];
+    let mut extremes = vec![
+        Message::Place { place_index: 0, frame_index: 0, radius_mm: 0, degree: None },
+        Message::Place { place_index: 0x7F, frame_index: 0x80, radius_mm: 0x3FFF, degree: Some(0) },
+        Message::Map { vertices: 0, edges: 0, digest: 0 },
+        Message::Edge { a: 0, b: 0, present: false },
+        evidence(0, 0),
+        evidence(0x1F_FFFF, i32::MAX),
+        evidence(0x0FFF_FFFF, -1),
+        Message::Health(Default::default()),
+        Message::Ring { frame_index: 0, echoes: Echoes::EMPTY },
+        Message::Ring { frame_index: 0, echoes: Echoes::new(&ring) },
+        Message::Renamed(Renamed { place_index: 0, names: List::new([]) }),
+        Message::Worst(Worst { place_index: 0, distance_mm: 0, newest_age: 0, vertices: List::new([]) }),
+        reply(Outcome::Info(info)),
+        reply(Outcome::Snapshot { total: 0, offset: 0, bytes: Chunk::new([]) }),
+        drive(0, 0),
+        drive(1, -1),
+        drive(2, 1),
+        drive(3, i16::MAX),
+    ];
+    extremes.extend(ResetCause::ALL.iter().map(|&reset_cause| Message::Hello(Hello { reset_cause, ..hello })));
+    extremes.extend(Refusal::ALL.iter().map(|&refusal| reply(Outcome::Refused(refusal))));
+    extremes.extend(JourneyState::ALL.iter().map(|&state| Message::Journey(Journey { vertex: 0, state })));
+    extremes
+}
+
+pub(crate) fn extreme_requests() -> Vec<Request> {
+    let commands = [
+        Command::GetSnapshot { offset: 0 },
+        Command::RestoreChunk { offset: 0, bytes: Chunk::new([]) },
+        Command::LocaliseOnly { on: false },
+        Command::GoTo { vertex: 0 },
+        Command::Pause { on: false },
+    ];
+    commands.map(|command| Request { id: 0, command }).to_vec()
 }

@@ -1,0 +1,210 @@
+//! Streams to which something has happened, for the golden file: what a line does to them, what a robot does, and what nobody should.
+
+use super::damage::with_crc;
+use super::samples::{extremes, largest, requests, typical};
+use super::{frame, hear};
+use toposlam::wire::{
+    Belief, Encoder, Hello, Journey, JourneyState, List, Location, Message, PlaceProbability, Renamed, ResetCause,
+    Worst, crc32,
+};
+
+/// Frames lost, repeated and overtaken.
+pub(crate) fn lossy(frames: &[Vec<u8>]) -> Vec<u8> {
+    let mut draw = Draw(7);
+    let mut bytes = vec![0];
+    let mut overtaken: &[u8] = &[];
+    for (number, frame) in frames.iter().enumerate() {
+        // The last round comes whole.
+        match if number + 40 > frames.len() { 9 } else { draw.below(20) } {
+            0 => {}
+            1 => bytes.extend([&frame[..], frame].concat()),
+            2 => overtaken = frame,
+            _ => bytes.extend([&frame[..], std::mem::take(&mut overtaken)].concat()),
+        }
+    }
+    bytes
+}
+
+/// The same robot twice, the second time as its next start and not from its first frame.
+pub(crate) fn restarted(frames: &[Vec<u8>]) -> Vec<u8> {
+    let Message::Hello(hello) = hear(&frames[0]).messages[0].1 else { panic!("a robot introduces itself first") };
+    let again = Message::Hello(Hello { boot: hello.boot.wrapping_add(1), reset_cause: ResetCause::Watchdog, ..hello });
+    [&frames[..60].concat()[..], &[0], &frame(&mut Encoder::new(0), &again), &frames[1..30].concat()].concat()
+}
+
+pub(crate) fn every_damage() -> Vec<u8> {
+    let edge = |sequence, b| frame(&mut Encoder::new(sequence), &Message::Edge { a: 1, b, present: true });
+    let request = frame(&mut Encoder::new(3), &requests()[0]);
+    let mut corrupt = edge(1, 3);
+    corrupt[3] ^= 0x40;
+    [
+        &edge(0, 2)[..],
+        &corrupt,
+        &edge(2, 4)[..6],
+        &[0, 0, 0],
+        &[1; 2],
+        &[0],
+        &[0xFF; 120],
+        &[0],
+        &with_crc(&[2, 3, 0, 4, 1, 2, 1]),
+        &request,
+        // After a gap a message that is not known here is not taken for received, in order it is.
+        &with_crc(&[1, 9, 0, 0x7F]),
+        &edge(4, 5),
+        &with_crc(&[1, 5, 0, 4, 1, 2, 1, 9]),
+        &with_crc(&[1, 6, 0, 4, 1, 2]),
+        &with_crc(&[1, 7, 0, 4, 1, 2, 2]),
+        &with_crc(&[1]),
+        &edge(8, 6),
+        &edge(8, 7),
+        &edge(9, 63),
+        &edge(10, 64),
+    ]
+    .concat()
+}
+
+pub(crate) fn wrapping() -> Vec<u8> {
+    let edge = Message::Edge { a: 0, b: 1, present: true };
+    let numbers = [65500, 65535, 0, 65535, 40, 65535, 32_807, 32_806, 32_743, 32_744, 65511, 65510, 32_742, 65510];
+    numbers.iter().flat_map(|&number| frame(&mut Encoder::new(number), &edge)).collect()
+}
+
+/// Each list with one element more than it can have, and a number of elements beyond all bounds.
+pub(crate) fn long_lists() -> Vec<u8> {
+    let list = |head: &[u8], count: u8, element: &[u8]| {
+        let body = [&[1, 0, 0], head, &[count], &element.repeat(count.into())].concat();
+        with_crc(&body)
+    };
+    [
+        list(&[10, 0], 33, &[5]),
+        list(&[11, 0, 0], 9, &[1, 1]),
+        list(&[12, 0], 65, &[1]),
+        list(&[13, 0, 0, 0], 8, &[1]),
+        list(&[14, 0, 2, 0, 0], 65, &[1]),
+        with_crc(&[1, 0, 0, 12, 0, 0xFF, 0xFF, 0xFF, 0xFF, 0xFF, 0xFF, 0xFF, 0xFF, 0xFF, 1]),
+        with_crc(&[1, 0, 0, 12, 0, 0xFF, 0xFF, 0xFF, 0xFF, 0xFF, 0xFF, 0xFF, 0xFF, 0xFF, 3]),
+        // A varint may be longer than it has to be, and names no value beyond its type.
+        with_crc(&[1, 0, 0, 12, 0x80, 0x80, 0, 0x81, 0, 7]),
+        with_crc(&[1, 1, 0, 12, 0xFF, 0xFF, 0xFF, 0xFF, 0x0F, 0]),
+        with_crc(&[1, 2, 0, 12, 0xFF, 0xFF, 0xFF, 0xFF, 0x1F, 0]),
+        with_crc(&[1, 2, 0, 12, 0x80, 0x80, 0x80, 0x80, 0x80, 0, 0]),
+    ]
+    .concat()
+}
+
+/// The frames of a small map, whose vertices get new numbers again and again.
+pub(crate) fn renamed() -> Vec<Vec<u8>> {
+    let canonical: [&[u8]; 3] =
+        [&[2], &[232, 3, 1, 0, 0, 0, 2, 0, 0, 0, 0, 0, 0, 0], &[232, 3, 1, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0]];
+    let map = Message::Map { vertices: 2, edges: 1, digest: crc32(&canonical.concat()) };
+    let vertex = |vertex| Message::Vertex { vertex, radius_mm: 1000, visits: 1 };
+    let names = |names: &[u8]| Message::Renamed(Renamed { place_index: 2, names: List::new(names.iter().copied()) });
+    let place = |(vertex, permille)| PlaceProbability { vertex, permille };
+    let messages = [
+        vertex(0),
+        vertex(1),
+        Message::Edge { a: 0, b: 1, present: true },
+        Message::Edge { a: 1, b: 5, present: true },
+        vertex(5),
+        map,
+        // What is gone does not come back with its number.
+        vertex(5),
+        map,
+        names(&[0, 1]),
+        map,
+        Message::Belief(Belief {
+            place_index: 2,
+            map_permille: 500,
+            places: List::new([(1, 600), (0, 300), (2, 70)].map(place)),
+        }),
+        Message::Location(Location { place_index: 2, vertex: 1 }),
+        Message::Journey(Journey { vertex: 0, state: JourneyState::Underway }),
+        Message::Worst(Worst { place_index: 2, distance_mm: 9, newest_age: 1, vertices: List::new([0, 1, 0]) }),
+        names(&[2, 2, 0]),
+        names(&[0, 1, 255, 4]),
+        names(&[]),
+        Message::Edge { a: 0, b: 3, present: true },
+        Message::Edge { a: 3, b: 3, present: true },
+        names(&[64, 1, 2, 63]),
+        names(&[200]),
+    ];
+    let mut encoder = Encoder::new(0);
+    messages.iter().map(|message| frame(&mut encoder, message)).collect()
+}
+
+/// Some bytes changed, left out, doubled or put in.
+pub(crate) fn damage(mut bytes: Vec<u8>, draw: &mut Draw) -> Vec<u8> {
+    for _ in 0..5 {
+        let place = draw.below(bytes.len());
+        let byte = draw.byte();
+        match draw.below(6) {
+            0 => bytes[place] ^= byte | 1,
+            1 => bytes[place] = 0,
+            2 => drop(bytes.remove(place)),
+            3 => bytes.insert(place, byte),
+            4 => {
+                let end = (place + draw.below(60)).min(bytes.len());
+                drop(bytes.drain(place..end));
+            }
+            _ => {
+                let end = (place + draw.below(140)).min(bytes.len());
+                let again = bytes[place..end].to_vec();
+                bytes.splice(place..place, again);
+            }
+        }
+    }
+    bytes
+}
+
+/// Intact frames that are near to those of messages.
+pub(crate) fn foreign_payloads(draw: &mut Draw) -> Vec<u8> {
+    let messages: Vec<Message> = typical().into_iter().chain(largest()).chain(extremes()).collect();
+    let mut bytes = Vec::new();
+    for sequence in 0..20u16 {
+        let message = messages[draw.below(messages.len())];
+        let mut body = unpacked(&frame(&mut Encoder::new(sequence), &message));
+        for _ in 0..draw.below(4) {
+            // Rarely in the header.
+            let place = if draw.below(12) == 0 { draw.below(3) } else { 3 + draw.below(body.len() - 3) };
+            let byte = draw.byte();
+            match draw.below(5) {
+                0 => body[place] = byte,
+                1 => body[place] ^= 0x80,
+                2 => body[place] = [0, 1, 2, 0x7F, 0x80, 0xFF][draw.below(6)],
+                3 if body.len() > 4 => drop(body.remove(place)),
+                _ => body.insert(place, byte),
+            }
+        }
+        bytes.extend(with_crc(&body));
+    }
+    bytes
+}
+
+/// Header and payload of a frame.
+fn unpacked(frame: &[u8]) -> Vec<u8> {
+    let (mut raw, mut code) = (frame[..frame.len() - 1].to_vec(), 0);
+    while let Some(slot) = raw.get_mut(code) {
+        code += usize::from(std::mem::take(slot));
+    }
+    raw[1..raw.len() - 4].to_vec()
+}
+
+/// Numbers at random that are the same everywhere: SplitMix64.
+pub(crate) struct Draw(pub(crate) u64);
+
+impl Draw {
+    fn next(&mut self) -> u64 {
+        self.0 = self.0.wrapping_add(0x9E37_79B9_7F4A_7C15);
+        let mixed = (self.0 ^ (self.0 >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
+        let mixed = (mixed ^ (mixed >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
+        mixed ^ (mixed >> 31)
+    }
+
+    pub(crate) fn below(&mut self, end: usize) -> usize {
+        (self.next() % end as u64) as usize
+    }
+
+    pub(crate) fn byte(&mut self) -> u8 {
+        self.next() as u8
+    }
+}
