@@ -179,3 +179,8 @@ pub use observation::{Observation, Turn};
 #[cfg(all(doctest, feature = "wire"))]
 #[doc = include_str!("../README.md")]
 struct Readme;
+
+/// So is the code in the guide to wiring.
+#[cfg(doctest)]
+#[doc = include_str!("../docs/wiring.md")]
+struct Wiring;

@@ -42,3 +42,8 @@ pub mod soak;
 pub mod topology;
 pub mod wording;
 pub mod world;
+
+/// The code in the guide to the stream is compiled as a test.
+#[cfg(doctest)]
+#[doc = include_str!("../../docs/stream.md")]
+struct Stream;
