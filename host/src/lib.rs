@@ -9,8 +9,9 @@
 //!
 //! Messages come from a robot. [`mod@line`] is the way to one and [`broadcast`] its end of it; [`listener`] understands what it says,
 //! [`client`] tells it what to do, [`topology`] is its map as plain data and [`layout`] where to draw that. [`export`] writes the map
-//! for other programs, [`monitor`] shows all in a terminal, [`serve`] in browsers, and [`log`] records it, with [`wording`],
-//! [`mod@setting`] and [`mod@json`] for what is said and set. [`fleet`] listens to a thousand robots at once, and `publish` (feature `mqtt`) tells a broker.
+//! for other programs, and [`log`] records all. [`link`] keeps a line open from a thread of its own and [`watch`] what came of it, which
+//! [`monitor`] shows in a terminal and [`serve`] in browsers, with [`wording`], [`mod@setting`] and [`mod@json`] for what is said and
+//! set. [`fleet`] listens to a thousand robots at once, and `publish` (feature `mqtt`) tells a broker.
 //!
 //! Maps are right or wrong: [`picture`] draws one over its floor plan, and [`evaluation`] measures how often they are right.
 
@@ -27,6 +28,7 @@ pub mod json;
 pub mod laps;
 pub mod layout;
 pub mod line;
+pub mod link;
 pub mod listener;
 pub mod log;
 pub mod mapping;
@@ -40,6 +42,7 @@ pub mod serve;
 pub mod setting;
 pub mod soak;
 pub mod topology;
+pub mod watch;
 pub mod wording;
 pub mod world;
 

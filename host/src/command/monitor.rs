@@ -6,8 +6,8 @@ use std::time::Duration;
 
 use anyhow::ensure;
 use clap::Args;
+use toposlam_host::link::Options;
 use toposlam_host::monitor::headless::{self, Form, Limits};
-use toposlam_host::monitor::link::Options;
 use toposlam_host::monitor::screen;
 
 /// Arguments of `toposlam monitor`.

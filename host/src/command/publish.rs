@@ -5,7 +5,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
 use clap::Args;
-use toposlam_host::monitor::link::{Link, News, Options as LinkOptions, Source};
+use toposlam_host::link::{Link, News, Options as LinkOptions, Source};
 use toposlam_host::publish::{Broker, BrokerNews, Options, Publisher};
 
 use super::interrupt::Interrupt;

@@ -2,9 +2,11 @@
 
 use anyhow::Context;
 use clap::Args;
-use toposlam_host::monitor::link;
+use toposlam_host::link;
+use toposlam_host::serve::follow;
 use toposlam_host::serve::server::{Options, Server};
-use toposlam_host::serve::{follow, watch::Watch};
+use toposlam_host::serve::state::State;
+use toposlam_host::watch::Watch;
 
 /// Arguments of `toposlam serve`.
 #[derive(Args)]
@@ -25,8 +27,8 @@ pub(crate) struct Arguments {
 pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     let Arguments { line, baud, listen, names } = arguments;
     let options = Options { names: names.clone(), ..Options::default() };
-    let server =
-        Server::bind(listen, options, &Watch::new(line).state()).with_context(|| format!("serving at {listen}"))?;
+    let server = Server::bind(listen, options, &State::of(&mut Watch::new(line)))
+        .with_context(|| format!("serving at {listen}"))?;
     let address = server.address();
     if !address.ip().to_canonical().is_loopback() {
         eprintln!("warning: whoever reaches {address} sees the robot's map: there is no password and no encryption");

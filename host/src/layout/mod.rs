@@ -28,7 +28,7 @@ mod smoothing;
 mod triangulation;
 mod untangling;
 
-use toposlam::wire::Renamed;
+use toposlam::wire::{Arrival, Header, Message, Renamed};
 
 use self::graph::Graph;
 use crate::topology::TopologicalMap;
@@ -86,6 +86,19 @@ impl Layout {
         let is_worth_it = redrawn == 0 || 2 * redrawn < left || left > conflicts::crossings(&self.graph, &self.points);
         if redrawn < left && is_worth_it {
             self.points = points;
+        }
+    }
+
+    /// Takes in what a message tells of the numbers of the vertices: that they are others now, or that the robot has started anew and
+    /// so has the picture.
+    pub fn hear(&mut self, header: Header, message: &Message) {
+        match header.arrival {
+            Arrival::Late => return,
+            Arrival::Restart => *self = Self::new(),
+            Arrival::First | Arrival::InOrder | Arrival::AfterGap { .. } => {}
+        }
+        if let Message::Renamed(renamed) = message {
+            self.rename(renamed);
         }
     }
 

@@ -6,7 +6,7 @@ use std::path::Path;
 
 use foxglove::messages::{Log, log::Level};
 use toposlam::FaultKind;
-use toposlam::wire::{Arrival, Header, Message};
+use toposlam::wire::{Arrival, Message};
 
 use super::LogError;
 use super::scene::{Scene, scan, timestamp};
@@ -153,25 +153,21 @@ struct Drawn {
 
 impl<FILE: Write> Notes<FILE> {
     fn note(&mut self, event: Event<'_>, time_ns: u64) -> Result<(), LogError> {
-        let Event::Message(Header { sequence, arrival }, message) = event else {
+        let Event::Message(header, message) = event else {
             return self.topics.event(time_ns, 0, &json::event(event));
         };
         if let Message::Ring { frame_index, echoes } = message {
             return self.topics.message(Topic::Ring, time_ns, *frame_index, &scan(echoes, time_ns));
         }
-        self.topics.event(time_ns, sequence.into(), &json::event(event))?;
-        if arrival == Arrival::Late {
+        self.topics.event(time_ns, header.sequence.into(), &json::event(event))?;
+        if header.arrival == Arrival::Late {
             return Ok(());
         }
-        if arrival == Arrival::Restart {
+        if header.arrival == Arrival::Restart {
             self.faults = [0; FAULT_KINDS];
         }
-        match message {
-            Message::Renamed(renamed) => self.layout.rename(renamed),
-            Message::Fault { kind, count } => return self.fault(*kind, *count, time_ns),
-            _ => {}
-        }
-        Ok(())
+        self.layout.hear(header, message);
+        if let Message::Fault { kind, count } = message { self.fault(*kind, *count, time_ns) } else { Ok(()) }
     }
 
     /// The robot repeats its counts; only one that has grown is told.

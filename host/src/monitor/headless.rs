@@ -7,7 +7,7 @@ use std::time::{Duration, Instant};
 use anyhow::{Context, ensure};
 use serde_json::{Value, json};
 
-use super::link::{Link, News, Options, Source};
+use crate::link::{Link, News, Options, Source};
 use crate::listener::Event;
 use crate::{json, wording};
 

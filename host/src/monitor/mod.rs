@@ -2,8 +2,7 @@
 //!
 //! | Part | Is |
 //! |---|---|
-//! | [`link`] | a thread that owns the line, opens it again when it is cut, and takes commands |
-//! | [`model`] | all that is shown; it takes in news of the link and keys, and says what to do |
+//! | [`model`] | all that is shown; it takes in news of a [`link`](crate::link) and keys, and says what to do |
 //! | [`view`] | the model on a ratatui frame; it changes nothing |
 //! | [`headless`] | a line of text for each event instead |
 //! | [`screen`] | the real terminal, and the loop between link, keys and frame |
@@ -15,8 +14,8 @@
 //!
 //! use ratatui::{Terminal, backend::TestBackend};
 //! use toposlam::wire::{Encoder, MAX_FRAME_BYTES, Message};
-//! use toposlam_host::listener::Listener;
-//! use toposlam_host::monitor::{link::News, model::Model, view};
+//! use toposlam_host::{link::News, listener::Listener};
+//! use toposlam_host::monitor::{model::Model, view};
 //!
 //! let mut model = Model::new("tcp:robot:7070");
 //! let (mut listener, mut frame) = (Listener::new(), [0; MAX_FRAME_BYTES]);
@@ -33,7 +32,6 @@
 //! ```
 
 pub mod headless;
-pub mod link;
 pub mod model;
 mod prompt;
 pub mod screen;

@@ -9,11 +9,9 @@ use ratatui::crossterm::event::{KeyCode, KeyEvent, KeyEventKind, KeyModifiers};
 use toposlam::FaultKind;
 use toposlam::wire::{Arrival, Command, Header, Info, Message, Outcome};
 
-use super::link::{Answer, News, Task, TaskError};
 use super::prompt::{Prompt, Question};
-use crate::layout::{Layout, Point};
-use crate::listener::Listener;
-use crate::topology::TopologicalMap;
+use crate::link::{Answer, News, Task, TaskError};
+use crate::watch::Watch;
 use crate::wording;
 
 const LOG_LINES: usize = 200;
@@ -21,13 +19,7 @@ const LOG_LINES: usize = 200;
 /// The state of the monitor.
 #[derive(Clone, Debug)]
 pub struct Model {
-    line: String,
-    connection: Connection,
-    listener: Listener,
-    map: TopologicalMap,
-    layout: Layout,
-    /// Whether the map was arranged since its vertices got new numbers.
-    arranged: bool,
+    watch: Watch,
     heard_at: Option<Instant>,
     quiet: Option<Duration>,
     told: Told,
@@ -38,19 +30,6 @@ pub struct Model {
     pane: Pane,
     /// The first vertex of the table.
     scroll: usize,
-}
-
-/// Whether the line is open.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub enum Connection {
-    /// It is being opened for the first time.
-    Opening,
-    /// It is open.
-    Open,
-    /// It is not, for this reason, and is tried again and again.
-    Cut(String),
-    /// The standard input has ended.
-    Ended,
 }
 
 /// What to do after a key.
@@ -98,12 +77,7 @@ impl Model {
     /// A monitor of a line of that name that has heard nothing; `-` is the standard input, on which nothing can be told.
     pub fn new(line: &str) -> Self {
         Self {
-            line: line.to_owned(),
-            connection: Connection::Opening,
-            listener: Listener::new(),
-            map: TopologicalMap::default(),
-            layout: Layout::new(),
-            arranged: true,
+            watch: Watch::new(line),
             heard_at: None,
             quiet: None,
             told: Told::default(),
@@ -118,70 +92,56 @@ impl Model {
 
     /// Takes in what happened on the link.
     pub fn hear(&mut self, news: News, now: Instant) {
-        match news {
+        match &news {
             News::Connected => {
-                self.connection = Connection::Open;
                 self.heard_at = Some(now);
                 self.note("connected");
             }
-            News::Disconnected(reason) => {
-                self.complain(format!("no line: {reason}; trying again"));
-                self.connection = Connection::Cut(reason);
-            }
-            News::Ended => {
-                self.connection = Connection::Ended;
-                self.note("the input has ended");
-            }
-            News::Heard(event, listener) => {
+            News::Disconnected(reason) => self.complain(format!("no line: {reason}; trying again")),
+            News::Ended => self.note("the input has ended"),
+            News::Heard(event, _) => {
                 self.heard_at = Some(now);
-                if let Ok((header, message)) = &event {
+                if let Ok((header, message)) = event {
                     self.take_in(*header, message);
                 }
-                self.listener = *listener;
             }
             News::Answered(task, answer) => {
                 self.waiting.pop_front();
-                self.answered(&task, answer);
+                self.answered(task, answer);
             }
         }
+        self.watch.hear(news);
     }
 
     fn take_in(&mut self, header: Header, message: &Message) {
         match header.arrival {
             Arrival::Late => return,
             Arrival::Restart => {
-                self.layout = Layout::new();
-                self.arranged = false;
                 self.told = Told::default();
                 self.complain("the robot has started anew".to_owned());
             }
             Arrival::First | Arrival::InOrder | Arrival::AfterGap { .. } => {}
         }
         match message {
-            Message::Renamed(renamed) => {
-                self.layout.rename(renamed);
-                self.arranged = false;
-                self.note(wording::message(message));
-            }
-            Message::Journey(_) => self.note(wording::message(message)),
+            Message::Renamed(_) | Message::Journey(_) => self.note(wording::message(message)),
             Message::Fault { kind, count } if self.is_news(*kind, *count) => self.complain(wording::message(message)),
             _ => {}
         }
     }
 
     fn is_news(&self, kind: u8, count: u32) -> bool {
-        FaultKind::ALL.get(usize::from(kind)).is_none_or(|&kind| self.listener.picture().fault(kind) != count)
+        FaultKind::ALL.get(usize::from(kind)).is_none_or(|&kind| self.watch.listener().picture().fault(kind) != count)
     }
 
-    fn answered(&mut self, task: &Task, answer: Result<Answer, TaskError>) {
+    fn answered(&mut self, task: &Task, answer: &Result<Answer, TaskError>) {
         match answer {
             Ok(Answer::Outcome(Outcome::Refused(refusal))) => self.complain(format!("{task}: refused: {refusal}")),
             Ok(Answer::Outcome(outcome)) => {
-                self.note(format!("{task}: {}", wording::outcome(&outcome)));
+                self.note(format!("{task}: {}", wording::outcome(outcome)));
                 match (task, outcome) {
                     (_, Outcome::Info(info)) => {
                         let (paused, localise_only) = (Some(info.paused), Some(info.localise_only));
-                        self.told = Told { paused, localise_only, info: Some(info) };
+                        self.told = Told { paused, localise_only, info: Some(*info) };
                     }
                     (Task::Tell(Command::Pause { on }), _) => self.told.paused = Some(*on),
                     (Task::Tell(Command::LocaliseOnly { on }), _) => self.told.localise_only = Some(*on),
@@ -228,7 +188,7 @@ impl Model {
                 None
             }
             KeyCode::Down => {
-                self.scroll = (self.scroll + 1).min(self.map.vertices.len().saturating_sub(1));
+                self.scroll = (self.scroll + 1).min(self.watch.map().vertices.len().saturating_sub(1));
                 None
             }
             KeyCode::Char(character) => self.begin(character),
@@ -287,41 +247,18 @@ impl Model {
 
     /// To be called before drawing: arranges the map if it has changed, and tells how long nothing was heard.
     pub fn settle(&mut self, now: Instant) {
-        let map = self.listener.map();
-        let same_shape = map.edges == self.map.edges && map.vertices.len() == self.map.vertices.len();
-        self.map = map;
-        if !self.arranged || !same_shape {
-            self.layout.arrange(&self.map);
-            self.arranged = true;
-        }
+        self.watch.arrange();
         self.quiet = self.heard_at.map(|heard_at| now.saturating_duration_since(heard_at));
     }
 
-    /// All that was heard of the robot.
-    pub const fn listener(&self) -> &Listener {
-        &self.listener
-    }
-
-    /// Whether the line is open.
-    pub const fn connection(&self) -> &Connection {
-        &self.connection
+    /// What is known of the robot.
+    pub const fn watch(&self) -> &Watch {
+        &self.watch
     }
 
     /// Whether nothing can be told.
     pub fn is_read_only(&self) -> bool {
-        self.line == "-"
-    }
-
-    pub(super) fn line(&self) -> &str {
-        &self.line
-    }
-
-    pub(super) const fn map(&self) -> &TopologicalMap {
-        &self.map
-    }
-
-    pub(super) fn points(&self) -> &[Point] {
-        self.layout.points()
+        self.watch.line() == "-"
     }
 
     pub(super) const fn quiet(&self) -> Option<Duration> {

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use toposlam::wire::Command;
 
-use super::link::Task;
+use crate::link::Task;
 use crate::setting;
 
 /// A question and what was typed so far.

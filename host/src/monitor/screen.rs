@@ -16,9 +16,9 @@ use ratatui::crossterm::event::{self, Event, KeyEvent};
 use ratatui::crossterm::execute;
 use ratatui::crossterm::terminal::{EnterAlternateScreen, LeaveAlternateScreen, disable_raw_mode, enable_raw_mode};
 
-use super::link::{Link, News, Options, Source};
 use super::model::{Action, Model};
 use super::view;
+use crate::link::{Link, News, Options, Source};
 
 /// News that wait to be taken in; a link that has more to say waits.
 const QUEUE: usize = 1024;

@@ -12,10 +12,10 @@ use toposlam::wire::{
     PROTOCOL_VERSION, Refusal, Renamed, ResetCause,
 };
 
-use super::link::{Answer, News, Task, TaskError};
 use super::model::{Action, Model};
 use super::view;
 use crate::exploration::Exploration;
+use crate::link::{Answer, News, Task, TaskError};
 use crate::listener::Listener;
 use crate::world::{Plan, RobotModel};
 

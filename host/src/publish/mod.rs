@@ -36,8 +36,8 @@ use toposlam::wire::{Encoder, MAX_FRAME_BYTES, Message};
 pub use broker::{Broker, OptionError, Options};
 
 use crate::json;
+use crate::link::News;
 use crate::listener::{Event, Listener};
-use crate::monitor::link::News;
 
 /// How much may wait for the broker.
 const QUEUE_MESSAGES: usize = 256;

@@ -2,8 +2,7 @@
 //!
 //! | Part | Is |
 //! |---|---|
-//! | [`state`] | what is known of a robot as JSON |
-//! | [`watch`] | takes in the news of a [`link`](crate::monitor::link) and gives the state |
+//! | [`state`] | what is known of a robot as JSON, from a [`Watch`] |
 //! | [`server`] | the page, the newest state, and the states as they come, for several browsers at once |
 //!
 //! A browser gets `/`, the page; `/map.json`, the newest state; and `/events`, the newest state and then each next one as
@@ -13,9 +12,10 @@
 //! use std::io::{Read, Write};
 //! use std::net::TcpStream;
 //!
-//! use toposlam_host::serve::{server::{Options, Server}, watch::Watch};
+//! use toposlam_host::serve::{server::{Options, Server}, state::State};
+//! use toposlam_host::watch::Watch;
 //!
-//! let server = Server::bind("127.0.0.1:0", Options::default(), &Watch::new("tcp:robot:7070").state())?;
+//! let server = Server::bind("127.0.0.1:0", Options::default(), &State::of(&mut Watch::new("tcp:robot:7070")))?;
 //! let mut browser = TcpStream::connect(server.address())?;
 //! write!(browser, "GET /map.json HTTP/1.1\r\nHost: {}\r\n\r\n", server.address())?;
 //! let mut answer = String::new();
@@ -28,13 +28,13 @@ mod http;
 mod newest;
 pub mod server;
 pub mod state;
-pub mod watch;
 
 use std::sync::mpsc::sync_channel;
 
 use self::server::Server;
-use self::watch::Watch;
-use crate::monitor::link::{Link, Options, Source};
+use self::state::State;
+use crate::link::{Link, Options, Source};
+use crate::watch::Watch;
 
 /// News that may wait. When more come the line waits for this computer; it never waits for a browser.
 const QUEUE: usize = 256;
@@ -49,7 +49,7 @@ pub fn follow(name: &str, baud: u32, options: Options, server: &Server) {
     while let Ok(first) = inbox.recv() {
         watch.hear(first);
         inbox.try_iter().take(QUEUE).for_each(|news| watch.hear(news));
-        server.publish(&watch.state());
+        server.publish(&State::of(&mut watch));
     }
 }
 

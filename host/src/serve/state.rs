@@ -1,49 +1,55 @@
 //! What is known of a robot as JSON, in two parts: what a place changes, and what each ring frame changes.
 //!
 //! ```
-//! use toposlam::wire::{Encoder, MAX_FRAME_BYTES, Message};
-//! use toposlam_host::{layout::Layout, listener::Listener, serve::state};
+//! use toposlam_host::{link::News, serve::state::State, watch::Watch};
 //!
-//! let mut listener = Listener::new();
-//! let edge = Message::Edge { a: 0, b: 1, present: true };
-//! listener.feed(Encoder::new(0).encode(&edge, &mut [0; MAX_FRAME_BYTES])?, |_, _| ());
-//! let mut layout = Layout::new();
-//! layout.arrange(&listener.map());
-//! assert_eq!(state::map(&listener, &layout)["edges"], serde_json::json!([[0, 1]]));
-//! # Ok::<(), toposlam::wire::EncodeError>(())
+//! let mut watch = Watch::new("tcp:robot:7070");
+//! watch.hear(News::Connected);
+//! let state = State::of(&mut watch);
+//! assert_eq!(state.map["connection"]["state"], "open");
+//! assert_eq!((state.map["edges"].to_string(), state.live["line"]["lost"].as_u64()), ("[]".to_owned(), Some(0)));
 //! ```
 
 use serde_json::{Value, json};
 use toposlam::FaultKind;
 
-use crate::layout::Layout;
 use crate::listener::{Listener, Understanding};
+use crate::watch::{Connection, Watch};
 use crate::{json, wording};
 
 /// Both parts.
 #[derive(Clone, Debug, PartialEq)]
 pub struct State {
-    /// What [`map`] gives, and what else is seldom news.
+    /// The line and whether it is open, the map where the layout draws it, where the robot may be, why it believes so, its journey, and
+    /// its faults.
+    ///
+    /// Distances are in millimetres, `null` when they are infinite; `x` and `y` count edges, `y` points up. What was not heard is `null`.
     pub map: Value,
-    /// What [`live`] gives.
+    /// The newest ring frame, what the drive does, and how well the robot is heard.
+    ///
+    /// `damaged` counts pieces of the line that were no whole frame, `unknown` whole frames that mean nothing here.
     pub live: Value,
 }
 
-/// The map where the layout draws it, where the robot may be, why it believes so, its journey, and its faults.
-///
-/// Distances are in millimetres, `null` when they are infinite; `x` and `y` count edges, `y` points up, `null` for a vertex that the
-/// layout has not placed. What was not heard is `null`.
-pub fn map(listener: &Listener, layout: &Layout) -> Value {
+impl State {
+    /// All that is known. Arranges the map.
+    pub fn of(watch: &mut Watch) -> Self {
+        watch.arrange();
+        Self { map: map(watch), live: live(watch.listener()) }
+    }
+}
+
+fn map(watch: &Watch) -> Value {
+    let listener = watch.listener();
     let picture = listener.picture();
-    let map = listener.map();
+    let map = watch.map();
     let vertices: Vec<Value> = (0..)
-        .zip(&map.vertices)
-        .map(|(number, vertex): (usize, _)| {
-            let point = layout.points().get(number);
+        .zip(map.vertices.iter().zip(watch.points()))
+        .map(|(number, (vertex, point)): (usize, _)| {
             json!({
                 "vertex": number,
-                "x": point.map(|point| thousandths(point.x)),
-                "y": point.map(|point| thousandths(point.y)),
+                "x": thousandths(point.x),
+                "y": thousandths(point.y),
                 "radius_mm": vertex.radius_mm,
                 "visits": vertex.visits,
             })
@@ -51,6 +57,8 @@ pub fn map(listener: &Listener, layout: &Layout) -> Value {
         .collect();
     let evidence = picture.evidence();
     json!({
+        "line": watch.line(),
+        "connection": connection(watch.connection()),
         "understanding": understanding(listener),
         "hello": picture.hello(),
         "vertices": vertices,
@@ -77,10 +85,7 @@ pub fn map(listener: &Listener, layout: &Layout) -> Value {
     })
 }
 
-/// The newest ring frame, what the drive does, and how well the robot is heard.
-///
-/// `damaged` counts pieces of the line that were no whole frame, `unknown` whole frames that mean nothing here.
-pub fn live(listener: &Listener) -> Value {
+fn live(listener: &Listener) -> Value {
     let counters = listener.counters();
     json!({
         "ring": listener.ring().map(|(frame_index, echoes)| json!({
@@ -100,6 +105,15 @@ pub fn live(listener: &Listener) -> Value {
             "unknown": counters.unknown_version.saturating_add(counters.unknown_message),
         },
     })
+}
+
+fn connection(connection: &Connection) -> Value {
+    match connection {
+        Connection::Opening => json!({"state": "opening"}),
+        Connection::Open => json!({"state": "open"}),
+        Connection::Cut(reason) => json!({"state": "cut", "reason": reason}),
+        Connection::Ended => json!({"state": "ended"}),
+    }
 }
 
 fn understanding(listener: &Listener) -> Value {

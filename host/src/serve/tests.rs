@@ -16,12 +16,12 @@ use toposlam::wire::{
 
 use super::server::{Options, Server};
 use super::state::State;
-use super::watch::Watch;
 use crate::broadcast::Broadcast;
 use crate::exploration::Exploration;
+use crate::link::{self, News};
 use crate::listener::Listener;
-use crate::monitor::link::{self, News};
 use crate::topology::TopologicalMap;
+use crate::watch::Watch;
 use crate::world::{Plan, RobotModel};
 
 /// Longer than anything takes; who waits so long has failed.
@@ -136,7 +136,7 @@ fn what_is_not_there_or_not_for_us_is_refused() {
 fn two_browsers_see_the_robots_map_and_the_newest_state_is_the_same() {
     let mut robot = Broadcast::bind("127.0.0.1:0").unwrap();
     let line = format!("tcp:{}", robot.address().unwrap());
-    let server = Arc::new(Server::bind("127.0.0.1:0", Options::default(), &Watch::new(&line).state()).unwrap());
+    let server = Arc::new(Server::bind("127.0.0.1:0", Options::default(), &State::of(&mut Watch::new(&line))).unwrap());
     thread::spawn({
         let server = Arc::clone(&server);
         move || super::follow(&line, 0, link::Options::default(), &server)
@@ -274,7 +274,7 @@ fn hear(watch: &mut Watch, messages: &[Message]) {
         listener.feed(encoder.encode(message, &mut frame).unwrap(), |listener, event| {
             watch.hear(News::heard(listener, event));
         });
-        watch.state();
+        watch.arrange();
     }
 }
 
@@ -286,9 +286,9 @@ fn a_robot_of_another_version_is_told_from_one_that_means_other_things() {
     let understanding = |hello| {
         let mut watch = Watch::new("line");
         hear(&mut watch, &[Message::Hello(hello)]);
-        watch.state().map["understanding"].take()
+        State::of(&mut watch).map["understanding"].take()
     };
-    assert_eq!(Watch::new("line").state().map["understanding"]["level"], "unknown");
+    assert_eq!(State::of(&mut Watch::new("line")).map["understanding"]["level"], "unknown");
     assert_eq!(understanding(hello)["level"], "whole");
     assert_eq!(understanding(Hello { schema_hash: 1, ..hello })["level"], "not");
     let newer = understanding(Hello { protocol_version: PROTOCOL_VERSION + 1, ..hello });
@@ -299,10 +299,10 @@ fn a_robot_of_another_version_is_told_from_one_that_means_other_things() {
 #[test]
 fn a_ring_frame_is_live_and_leaves_the_map_as_it_was() {
     let mut watch = Watch::new("line");
-    let before = watch.state();
+    let before = State::of(&mut watch);
     let echoes = Echoes::new(&[Echo::Range { range_mm: 1482 }, Echo::Silence, Echo::Dead]);
     hear(&mut watch, &[Message::Ring { frame_index: 7, echoes }]);
-    let State { map, live } = watch.state();
+    let State { map, live } = State::of(&mut watch);
     assert_eq!(live["ring"], json!({"frame_index": 7, "ranges_mm": [1482, "silence", "dead"]}));
     assert_eq!((before.live["ring"].is_null(), map), (true, before.map));
 }
@@ -311,7 +311,7 @@ fn a_ring_frame_is_live_and_leaves_the_map_as_it_was() {
 fn a_vertex_keeps_its_position_under_its_new_number() {
     let edge = |a, b| Message::Edge { a, b, present: true };
     let positions = |watch: &mut Watch| -> Vec<(f64, f64)> {
-        let map = watch.state().map;
+        let map = State::of(watch).map;
         let vertices = map["vertices"].as_array().unwrap().iter();
         vertices.map(|vertex| (vertex["x"].as_f64().unwrap(), vertex["y"].as_f64().unwrap())).collect()
     };
@@ -334,7 +334,7 @@ fn measure_the_way_from_the_robot_to_a_browser() {
     const FRAMES: u32 = 600;
     let mut robot = Broadcast::bind("127.0.0.1:0").unwrap();
     let line = format!("tcp:{}", robot.address().unwrap());
-    let server = Arc::new(Server::bind("127.0.0.1:0", Options::default(), &Watch::new(&line).state()).unwrap());
+    let server = Arc::new(Server::bind("127.0.0.1:0", Options::default(), &State::of(&mut Watch::new(&line))).unwrap());
     let events = Events::of(server.address());
     thread::spawn({
         let server = Arc::clone(&server);

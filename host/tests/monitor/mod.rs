@@ -10,7 +10,8 @@ use serde_json::Value;
 use terminal::PseudoTerminal;
 use toposlam::reference::SNAPSHOT_BYTES;
 use toposlam_host::exploration::Exploration;
-use toposlam_host::monitor::{link::Options, screen};
+use toposlam_host::link::Options;
+use toposlam_host::monitor::screen;
 use toposlam_host::world::{Plan, RobotModel};
 
 use super::{complaint, printed, toposlam};

@@ -9,7 +9,7 @@ use crate::monitor::model::Model;
 use crate::wording::{distance, nats};
 
 pub(super) fn draw(frame: &mut Frame<'_>, area: Rect, model: &Model) {
-    let listener = model.listener();
+    let listener = model.watch().listener();
     let picture = listener.picture();
     let mut lines = Vec::new();
     if let Some(location) = picture.location() {

@@ -22,7 +22,7 @@ const LEAST: f64 = 0.08;
 pub(super) fn draw(frame: &mut Frame<'_>, area: Rect, model: &Model) {
     let block = Block::bordered().title("map: number, radius in mm; @ and yellow: the robot");
     let inside = block.inner(area);
-    let (x_bounds, y_bounds) = bounds(model.points(), inside);
+    let (x_bounds, y_bounds) = bounds(model.watch().points(), inside);
     let canvas = Canvas::default()
         .block(block)
         .marker(Marker::Braille)
@@ -33,8 +33,8 @@ pub(super) fn draw(frame: &mut Frame<'_>, area: Rect, model: &Model) {
 }
 
 fn paint(context: &mut Context<'_>, model: &Model) {
-    let points = model.points();
-    let map = model.map();
+    let points = model.watch().points();
+    let map = model.watch().map();
     for &(a, b) in &map.edges {
         let (Some(from), Some(to)) = (points.get(usize::from(a)), points.get(usize::from(b))) else { continue };
         let color = if is_worst(model, a, b) { Color::LightRed } else { Color::Gray };
@@ -70,7 +70,7 @@ fn label(model: &Model, number: usize, radius_mm: u16) -> TextLine<'static> {
 }
 
 fn color_of(model: &Model, number: usize) -> Color {
-    let target = model.listener().picture().journey().map(|journey| usize::from(journey.vertex));
+    let target = model.watch().listener().picture().journey().map(|journey| usize::from(journey.vertex));
     if is_here(model, number) {
         Color::Yellow
     } else if permille_at(model, number).is_some() {
@@ -83,12 +83,12 @@ fn color_of(model: &Model, number: usize) -> Color {
 }
 
 fn is_here(model: &Model, number: usize) -> bool {
-    model.listener().picture().location().is_some_and(|location| usize::from(location.vertex) == number)
+    model.watch().listener().picture().location().is_some_and(|location| usize::from(location.vertex) == number)
 }
 
 /// Whether the walk that explains the worst n-gram goes along this edge.
 fn is_worst(model: &Model, a: u8, b: u8) -> bool {
-    let Some(worst) = model.listener().picture().worst() else { return false };
+    let Some(worst) = model.watch().listener().picture().worst() else { return false };
     worst.vertices.as_slice().windows(2).any(|step| *step == [a, b] || *step == [b, a])
 }
 

@@ -16,8 +16,9 @@ use ratatui::style::{Color, Modifier, Style};
 use ratatui::text::{Line, Span};
 use ratatui::widgets::{Block, Paragraph, Wrap};
 
-use super::model::{Connection, Model, Pane};
+use super::model::{Model, Pane};
 use crate::listener::Understanding;
+use crate::watch::Connection;
 
 /// A robot sends several messages a second; this long without one is worth a word.
 const QUIET_SECONDS: f64 = 3.0;
@@ -91,14 +92,14 @@ fn chosen(frame: &mut Frame<'_>, area: Rect, model: &Model) {
 }
 
 fn heading(model: &Model) -> Line<'_> {
-    let connection = match model.connection() {
+    let connection = match model.watch().connection() {
         Connection::Opening => Span::styled("opening", FAINT),
         Connection::Open => Span::styled("connected", GOOD),
         Connection::Cut(_) => Span::styled("no line", BAD),
         Connection::Ended => Span::styled("ended", FAINT),
     };
-    let picture = model.listener().picture();
-    let map = model.map();
+    let picture = model.watch().listener().picture();
+    let map = model.watch().map();
     let whole = match (picture.vertices(), picture.is_converged()) {
         (0, _) => Span::styled("no map yet", FAINT),
         (_, true) => Span::styled("as the robot has it", GOOD),
@@ -106,23 +107,23 @@ fn heading(model: &Model) -> Line<'_> {
     };
     let size =
         format!(" {}, {} ", many(map.vertices.len(), "vertex", "vertices"), many(map.edges.len(), "edge", "edges"));
-    let name = if model.is_read_only() { "standard input" } else { model.line() };
+    let name = if model.is_read_only() { "standard input" } else { model.watch().line() };
     Line::from(vec![Span::from(format!("{name} ")), connection, Span::from(size), whole])
 }
 
 /// What whoever looks must know before anything else, with the rows that each takes.
 fn banners(model: &Model, width: u16) -> Vec<(Paragraph<'_>, u16)> {
     let mut texts = Vec::new();
-    if let Connection::Cut(reason) = model.connection() {
+    if let Connection::Cut(reason) = model.watch().connection() {
         texts.push((format!("no line: {reason}; trying again. What is shown is as it was."), ALARM));
     }
-    let understanding = model.listener().understanding();
+    let understanding = model.watch().listener().understanding();
     match understanding {
         Understanding::Unknown | Understanding::Whole => {}
         Understanding::Partly { .. } => texts.push((understanding.to_string(), WARNING)),
         Understanding::Not(_) => texts.push((format!("DO NOT TRUST WHAT IS SHOWN: {understanding}"), ALARM)),
     }
-    if *model.connection() == Connection::Open
+    if *model.watch().connection() == Connection::Open
         && let Some(quiet) = model.quiet()
         && quiet.as_secs_f64() >= QUIET_SECONDS
     {

@@ -21,9 +21,10 @@ use crate::monitor::model::Model;
 const LEAST_RANGE_MM: f64 = 500.0;
 
 pub(super) fn draw(frame: &mut Frame<'_>, area: Rect, model: &Model) {
-    let echoes: Vec<Echo> = model.listener().ring().map_or_else(Vec::new, |(_, echoes)| echoes.iter().collect());
+    let echoes: Vec<Echo> =
+        model.watch().listener().ring().map_or_else(Vec::new, |(_, echoes)| echoes.iter().collect());
     let range_mm = farthest_mm(&echoes);
-    let title = match model.listener().ring() {
+    let title = match model.watch().listener().ring() {
         Some((index, _)) => format!("ring {index}, rim at {range_mm:.0} mm"),
         None => "heading; no ring was heard".to_owned(),
     };
@@ -42,7 +43,7 @@ pub(super) fn draw(frame: &mut Frame<'_>, area: Rect, model: &Model) {
 
 fn paint(context: &mut Context<'_>, model: &Model, echoes: &[Echo], range_mm: f64) {
     context.draw(&Circle { x: 0.0, y: 0.0, radius: range_mm, color: Color::DarkGray });
-    if let Some(drive) = model.listener().drive() {
+    if let Some(drive) = model.watch().listener().drive() {
         let (x, y) =
             towards(f64::from(drive.heading_mrad) / 1000.0, range_mm * f64::from(drive.speed_permille) / 1000.0);
         context.draw(&Line::new(0.0, 0.0, x, y, Color::Green));
@@ -76,7 +77,7 @@ fn paint(context: &mut Context<'_>, model: &Model, echoes: &[Echo], range_mm: f6
 
 /// How many sonars the ring has, as far as anyone has said.
 fn sonars(model: &Model, echoes: usize) -> usize {
-    let told = model.listener().picture().hello().map_or(0, |hello| usize::from(hello.capacities.sonars));
+    let told = model.watch().listener().picture().hello().map_or(0, |hello| usize::from(hello.capacities.sonars));
     told.max(echoes).max(1)
 }
 

@@ -11,7 +11,7 @@ use crate::monitor::model::Model;
 use crate::wording::{drive_state, seconds};
 
 pub(super) fn draw(frame: &mut Frame<'_>, area: Rect, model: &Model) {
-    let listener = model.listener();
+    let listener = model.watch().listener();
     let picture = listener.picture();
     let mut lines = Vec::new();
     if let Some(drive) = listener.drive() {
@@ -54,14 +54,14 @@ fn told(model: &Model) -> Option<Line<'static>> {
 }
 
 fn faults(model: &Model) -> Line<'static> {
-    let picture = model.listener().picture();
+    let picture = model.watch().listener().picture();
     let counts = FaultKind::ALL.iter().map(|&kind| (kind, picture.fault(kind))).filter(|&(_, count)| count > 0);
     let named: Vec<String> = counts.map(|(kind, count)| format!("{kind:?} {count}")).collect();
     if named.is_empty() { Line::styled("no faults", GOOD) } else { Line::styled(named.join(", "), BAD) }
 }
 
 fn heard(model: &Model) -> Line<'static> {
-    let counters = model.listener().counters();
+    let counters = model.watch().listener().counters();
     let unknown = counters.unknown_version.saturating_add(counters.unknown_message);
     let damaged = counters.corrupt.saturating_add(counters.cut).saturating_add(counters.too_long);
     let style = if counters.lost > 0 || unknown > 0 || damaged > 0 { BAD } else { Style::new() };

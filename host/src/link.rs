@@ -5,7 +5,7 @@
 //! use std::sync::mpsc::channel;
 //!
 //! use toposlam_host::broadcast::Broadcast;
-//! use toposlam_host::monitor::link::{Link, News, Options, Source};
+//! use toposlam_host::link::{Link, News, Options, Source};
 //!
 //! let mut robot = Broadcast::bind("127.0.0.1:0")?;
 //! let (sender, news) = channel();
