@@ -53,7 +53,7 @@ pub struct Place {
     /// The frame in which the robot was closest to the meet point, counted from 0 since the start of the detector.
     pub frame_index: u32,
     /// In how many directions the way leads on between the equidistant obstacles, 1 at a dead end; `None` when the
-    /// frames disagree. A way that ends within twice the radius is not seen as one, and neither is one between two
+    /// frames disagree. A way that ends within 1.6 times the radius is not seen as one, and neither is one between two
     /// obstacles that are closer in bearing than `separation_mrad`.
     pub degree: Option<u8>,
     /// The smallest spread of the equidistant obstacles, in millimetres: how well the place was seen.
