@@ -1,78 +1,12 @@
 //! All stages in one: what reaches the filter, and what the listener makes of what is sent.
 
+mod common;
+
+use common::notes::Notes;
 use toposlam::reference::{self, PaperReference, SONARS, VERTICES};
 use toposlam::wire::{Arrival, Belief, Header, Location, Message, Picture, ResetCause, Worst};
-use toposlam::{
-    ConfigError, FaultCounters, Filter, FilterCapacities, Map, Mapper, MapperConfig, Observation, Turn, Update,
-    WeightFactors, WorstNgram,
-};
+use toposlam::{FaultCounters, Filter, Mapper, MapperConfig, Observation, Turn};
 use toposlam_host::world::{Plan, RobotModel, Simulation};
-
-/// A filter that only notes what it is told.
-struct Notes {
-    observations: Vec<Observation>,
-    map: Map<VERTICES>,
-    faults: FaultCounters,
-}
-
-impl Filter<VERTICES> for Notes {
-    type Config = u16;
-
-    const UNSTARTED: Self = Self { observations: Vec::new(), map: Map::new(), faults: FaultCounters::new() };
-
-    fn capacities(&history: &u16) -> FilterCapacities {
-        FilterCapacities { hypotheses: 7, history, ngram_length: 3 }
-    }
-
-    fn start(&mut self, history: u16, _: u64) -> Result<(), ConfigError> {
-        if history == 0 { Err(ConfigError("history")) } else { Ok(()) }
-    }
-
-    fn set_config(&mut self, _: u16) -> Result<(), ConfigError> {
-        Ok(())
-    }
-
-    fn observe(&mut self, observation: Observation) -> Update {
-        self.observations.push(observation);
-        Update {
-            place_index: self.observations.len() as u32 - 1,
-            vertex: 0,
-            is_new: false,
-            consistency_mm: 0,
-            factors: WeightFactors { ln_label_q16: 0, ln_consistency_q16: 0, ln_size_q16: 0 },
-            lead_q16: 0,
-            distinct: 1,
-        }
-    }
-
-    fn map(&self) -> &Map<VERTICES> {
-        &self.map
-    }
-
-    fn faults(&self) -> &FaultCounters {
-        &self.faults
-    }
-
-    fn recent(&self, _: usize) -> Option<u8> {
-        None
-    }
-
-    fn place_probability_q16(&self, _: u8) -> u32 {
-        0
-    }
-
-    fn map_probability_q16(&self) -> u32 {
-        0
-    }
-
-    fn renamed(&self, before: u8) -> Option<u8> {
-        Some(before)
-    }
-
-    fn worst(&self) -> WorstNgram {
-        WorstNgram::NONE
-    }
-}
 
 fn config<C>(filter: C) -> MapperConfig<SONARS, C> {
     let (geometry, place) = (reference::RING, reference::PLACE);

@@ -5,6 +5,7 @@
 
 pub mod drive;
 pub mod environments;
+pub mod notes;
 pub mod random;
 pub mod robot;
 pub mod watched;

@@ -1,85 +1,12 @@
 //! A mapper in a snapshot: with other sections, and with the next place where it should be.
 
 use toposlam::reference::{self, PaperReference, SONARS, VERTICES};
-use toposlam::snapshot::{Reader, Resume, Snapshot, SnapshotError, Writer};
+use toposlam::snapshot::{Resume, Snapshot, SnapshotError, Writer};
 use toposlam::wire::{ResetCause, map_digest};
-use toposlam::{
-    ConfigError, FaultCounters, Filter, FilterCapacities, Map, Mapper, MapperConfig, Observation, Update,
-    WeightFactors, WorstNgram,
-};
+use toposlam::{FaultCounters, Filter, Mapper, MapperConfig};
 use toposlam_host::world::{Plan, RobotModel, Simulation};
 
-/// A filter that knows whether places begin sequences, and saves one number.
-struct Notes {
-    begins: Vec<bool>,
-    number: u8,
-    map: Map<VERTICES>,
-    faults: FaultCounters,
-}
-
-impl Filter<VERTICES> for Notes {
-    type Config = u8;
-
-    const UNSTARTED: Self = Self { begins: Vec::new(), number: 0, map: Map::new(), faults: FaultCounters::new() };
-
-    fn capacities(_: &u8) -> FilterCapacities {
-        FilterCapacities { hypotheses: 1, history: 1, ngram_length: 1 }
-    }
-
-    fn start(&mut self, number: u8, _: u64) -> Result<(), ConfigError> {
-        self.number = number;
-        Ok(())
-    }
-
-    fn set_config(&mut self, _: u8) -> Result<(), ConfigError> {
-        Ok(())
-    }
-
-    fn observe(&mut self, observation: Observation) -> Update {
-        self.begins.push(observation.begins);
-        let factors = WeightFactors { ln_label_q16: 0, ln_consistency_q16: 0, ln_size_q16: 0 };
-        Update { place_index: 0, vertex: 0, is_new: false, consistency_mm: 0, factors, lead_q16: 0, distinct: 1 }
-    }
-
-    fn map(&self) -> &Map<VERTICES> {
-        &self.map
-    }
-
-    fn faults(&self) -> &FaultCounters {
-        &self.faults
-    }
-
-    fn recent(&self, _: usize) -> Option<u8> {
-        None
-    }
-
-    fn place_probability_q16(&self, _: u8) -> u32 {
-        0
-    }
-
-    fn map_probability_q16(&self) -> u32 {
-        0
-    }
-
-    fn renamed(&self, before: u8) -> Option<u8> {
-        Some(before)
-    }
-
-    fn worst(&self) -> WorstNgram {
-        WorstNgram::NONE
-    }
-
-    fn save(&mut self, writer: &mut Writer<'_>) -> Result<(), SnapshotError> {
-        writer.u8(self.number)
-    }
-
-    fn restore(&mut self, mut reader: Reader<'_>) -> Result<(), SnapshotError> {
-        let number = reader.u8()?;
-        reader.finish()?;
-        self.number = number;
-        Ok(())
-    }
-}
+use super::common::notes::Notes;
 
 fn started<F: Filter<VERTICES>>(filter: F::Config) -> Box<Mapper<SONARS, VERTICES, F>> {
     let mut mapper = Box::new(Mapper::new());
@@ -109,6 +36,11 @@ fn simulation() -> Simulation {
     Simulation::new(&Plan::built_in("office").unwrap(), RobotModel::default(), 3).unwrap()
 }
 
+/// Which of its places the filter takes to begin a sequence.
+fn begins_of(mapper: &Mapper<SONARS, VERTICES, Notes>) -> Vec<bool> {
+    mapper.filter().observations.iter().map(|observation| observation.begins).collect()
+}
+
 #[test]
 fn the_next_place_begins_a_sequence_when_the_robot_may_be_elsewhere() {
     let mut buffer = [0; 64];
@@ -116,9 +48,9 @@ fn the_next_place_begins_a_sequence_when_the_robot_may_be_elsewhere() {
     for (resume, begins) in [(Resume::Elsewhere, true), (Resume::InPlace, false)] {
         let mut mapper = started::<Notes>(9);
         mapper.restore(&buffer[..length], resume).unwrap();
-        assert_eq!(mapper.filter().number, 5);
+        assert_eq!(mapper.filter().history, 5);
         drive(&mut mapper, &mut simulation(), 3);
-        assert_eq!(mapper.filter().begins, [begins, false, false]);
+        assert_eq!(begins_of(&mapper), [begins, false, false]);
     }
     // Refused bytes and a new start leave nothing behind.
     let mut mapper = started::<Notes>(9);
@@ -134,7 +66,7 @@ fn the_next_place_begins_a_sequence_when_the_robot_may_be_elsewhere() {
     };
     mapper.start(&config).unwrap();
     drive(&mut mapper, &mut simulation(), 1);
-    assert_eq!((mapper.filter().begins.as_slice(), mapper.filter().number), (&[false][..], 9));
+    assert_eq!((begins_of(&mapper), mapper.filter().history), (vec![false], 9));
 }
 
 #[test]
@@ -146,7 +78,7 @@ fn sections_of_other_stages_are_kept_beside_the_mapper_s_and_skipped() {
     let length = writer.finish().unwrap();
     let mut mapper = started::<Notes>(9);
     mapper.restore(&buffer[..length], Resume::InPlace).unwrap();
-    assert_eq!(mapper.filter().number, 5);
+    assert_eq!(mapper.filter().history, 5);
     assert_eq!(Snapshot::open(&buffer[..length]).unwrap().section(77).unwrap().u32(), Ok(4711));
     let mut without = [0; 64];
     let length = Writer::new(&mut without).unwrap().finish().unwrap();

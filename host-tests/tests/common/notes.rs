@@ -1,0 +1,87 @@
+//! A filter that maps nothing and notes what it is told.
+
+use toposlam::reference::VERTICES;
+use toposlam::snapshot::{Reader, SnapshotError, Writer};
+use toposlam::{
+    ConfigError, FaultCounters, Filter, FilterCapacities, Map, Observation, Update, WeightFactors, WorstNgram,
+};
+
+/// What a mapper told its filter. Started with the capacity of its history, which a snapshot of it holds; 0 is out of range.
+pub struct Notes {
+    pub observations: Vec<Observation>,
+    pub history: u16,
+    map: Map<VERTICES>,
+    faults: FaultCounters,
+}
+
+impl Filter<VERTICES> for Notes {
+    type Config = u16;
+
+    const UNSTARTED: Self =
+        Self { observations: Vec::new(), history: 0, map: Map::new(), faults: FaultCounters::new() };
+
+    fn capacities(&history: &u16) -> FilterCapacities {
+        FilterCapacities { hypotheses: 7, history, ngram_length: 3 }
+    }
+
+    fn start(&mut self, history: u16, _: u64) -> Result<(), ConfigError> {
+        self.history = history;
+        if history == 0 { Err(ConfigError("history")) } else { Ok(()) }
+    }
+
+    fn set_config(&mut self, _: u16) -> Result<(), ConfigError> {
+        Ok(())
+    }
+
+    fn observe(&mut self, observation: Observation) -> Update {
+        self.observations.push(observation);
+        Update {
+            place_index: self.observations.len() as u32 - 1,
+            vertex: 0,
+            is_new: false,
+            consistency_mm: 0,
+            factors: WeightFactors { ln_label_q16: 0, ln_consistency_q16: 0, ln_size_q16: 0 },
+            lead_q16: 0,
+            distinct: 1,
+        }
+    }
+
+    fn map(&self) -> &Map<VERTICES> {
+        &self.map
+    }
+
+    fn faults(&self) -> &FaultCounters {
+        &self.faults
+    }
+
+    fn recent(&self, _: usize) -> Option<u8> {
+        None
+    }
+
+    fn place_probability_q16(&self, _: u8) -> u32 {
+        0
+    }
+
+    fn map_probability_q16(&self) -> u32 {
+        0
+    }
+
+    fn renamed(&self, before: u8) -> Option<u8> {
+        Some(before)
+    }
+
+    fn worst(&self) -> WorstNgram {
+        WorstNgram::NONE
+    }
+
+    fn save(&mut self, writer: &mut Writer<'_>) -> Result<(), SnapshotError> {
+        writer.u16(self.history)
+    }
+
+    fn restore(&mut self, mut reader: Reader<'_>) -> Result<(), SnapshotError> {
+        let history = reader.u16()?;
+        reader.finish()?;
+        self.history = history;
+        Ok(())
+    }
+}
