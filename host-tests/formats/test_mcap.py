@@ -17,8 +17,9 @@ import sys
 import tempfile
 import threading
 import unittest
-import zlib
 from pathlib import Path
+
+from frames import frame, varint
 
 REPOSITORY = Path(__file__).resolve().parents[2]
 TOPOSLAM = os.environ.get("TOPOSLAM", str(REPOSITORY / "target" / "debug" / "toposlam"))
@@ -71,21 +72,11 @@ def run(*arguments: str) -> str:
     return done.stdout
 
 
-def cobs(data: bytes) -> bytes:
-    """Consistent overhead byte stuffing of less than 254 bytes, with the closing zero (docs/wire.md, Frame)."""
-    return b"".join(bytes([len(part) + 1]) + part for part in data.split(b"\0")) + b"\0"
-
-
-def frame(sequence: int, payload: bytes) -> bytes:
-    body = bytes([1]) + sequence.to_bytes(2, "little") + payload
-    return cobs(body + zlib.crc32(body).to_bytes(4, "little"))
-
-
 def crafted() -> bytes:
     """An edge, a fault, a damaged frame, and a ring of 500 mm, silence and a dead sonar (docs/wire.md, Messages)."""
     damaged = bytearray(frame(2, bytes([8, 1, 1])))
     damaged[-3] ^= 0x80
-    ring = bytes([10, 7, 3]) + bytes([0x80 | (502 & 0x7F), 502 >> 7]) + bytes([1, 0])
+    ring = bytes([10, 7, 3]) + varint(502) + bytes([1, 0])
     return frame(0, bytes([4, 0, 1, 1])) + frame(1, bytes([8, 0, 5])) + bytes(damaged) + frame(3, ring)
 
 

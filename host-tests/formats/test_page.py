@@ -13,8 +13,9 @@ import socket
 import subprocess
 import time
 import unittest
-import zlib
 from pathlib import Path
+
+from frames import frame, varint
 
 REPOSITORY = Path(__file__).resolve().parents[2]
 TOPOSLAM = os.environ.get("TOPOSLAM", str(REPOSITORY / "target" / "debug" / "toposlam"))
@@ -67,20 +68,6 @@ def serve(line: str, address: str = "127.0.0.1:0") -> Program:
 def command(line: str, *arguments: str) -> str:
     done = subprocess.run([TOPOSLAM, "command", line, *arguments], capture_output=True, text=True, timeout=FOREVER_S, check=True)
     return done.stdout
-
-
-def cobs(data: bytes) -> bytes:
-    """Consistent overhead byte stuffing of less than 254 bytes, with the closing zero (docs/wire.md, Frame)."""
-    return b"".join(bytes([len(part) + 1]) + part for part in data.split(b"\0")) + b"\0"
-
-
-def frame(sequence: int, payload: bytes) -> bytes:
-    body = bytes([1]) + sequence.to_bytes(2, "little") + payload
-    return cobs(body + zlib.crc32(body).to_bytes(4, "little"))
-
-
-def varint(value: int) -> bytes:
-    return bytes([value]) if value < 128 else bytes([value & 0x7F | 0x80]) + varint(value >> 7)
 
 
 def hello(version: int) -> bytes:
