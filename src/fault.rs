@@ -1,4 +1,14 @@
 //! Everything that can go wrong while the robot runs, by kind, and how often it did.
+//!
+//! ```
+//! use toposlam::{FaultCounters, FaultKind};
+//!
+//! let (mut ring, mut filter) = (FaultCounters::new(), FaultCounters::new());
+//! ring.count(FaultKind::SonarSilent);
+//! filter.count(FaultKind::VerticesFull);
+//! ring.add(&filter);
+//! assert_eq!((ring.of(FaultKind::VerticesFull), ring.of(FaultKind::BusError)), (1, 0));
+//! ```
 
 /// A kind of fault. Faults are counted and reported; none of them ends the mapping or loses a map.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]

@@ -14,6 +14,16 @@ pub enum Turn {
 }
 
 /// One visit to a place.
+///
+/// ```
+/// use toposlam::{Fingerprint, Observation, Turn};
+///
+/// // A dead end, to which the robot did not turn back. A detector or a drive that does not know says `None`.
+/// let radius = Fingerprint::from_radius_mm(640)?;
+/// let observation = Observation { turn: Some(Turn::On), degree: Some(1), ..Observation::new(radius) };
+/// assert!(!observation.begins);
+/// # Ok::<(), toposlam::FingerprintError>(())
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Observation {
     /// The radius of the place.

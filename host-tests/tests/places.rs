@@ -6,10 +6,11 @@ use std::path::Path;
 
 use proptest::prelude::*;
 use toposlam::place::{Place, PlaceConfig, PlaceDetector};
+use toposlam::reference;
 use toposlam::ring::{Echo, RingFrame};
 use toposlam::{FaultKind, Turn};
 use toposlam_host::recording::Ring;
-use toposlam_host::world::{Journal, Plan, Report, RobotModel, SONARS, Simulation, SonarModel, even_ring};
+use toposlam_host::world::{Journal, Plan, Report, RobotModel, SONARS, Simulation, SonarModel};
 
 /// Drives until so many nodes were visited.
 fn drive(plan: &str, model: RobotModel, seed: u64, visits: usize) -> (Report, Vec<Place>) {
@@ -17,7 +18,7 @@ fn drive(plan: &str, model: RobotModel, seed: u64, visits: usize) -> (Report, Ve
     let mut simulation = Simulation::new(&plan, model, seed).unwrap();
     let mut journal = Journal::new(simulation.true_map());
     let mut detector = PlaceDetector::<SONARS>::new();
-    detector.start(PlaceConfig::DEFAULT, even_ring()).unwrap();
+    detector.start(PlaceConfig::DEFAULT, reference::RING).unwrap();
     while journal.visits() < visits {
         let (frame, truth) = simulation.next().unwrap();
         journal.drive(&truth);
@@ -60,7 +61,7 @@ fn the_drive_tells_rightly_whether_the_robot_turned_back_at_the_place_before() {
     let mut simulation = Simulation::new(&plan, RobotModel::default(), 7).unwrap();
     let mut journal = Journal::new(simulation.true_map());
     let mut detector = PlaceDetector::<SONARS>::new();
-    detector.start(PlaceConfig::DEFAULT, even_ring()).unwrap();
+    detector.start(PlaceConfig::DEFAULT, reference::RING).unwrap();
     let mut turns = Vec::new();
     while turns.len() < 80 {
         let (frame, truth) = simulation.next().unwrap();
@@ -149,7 +150,7 @@ proptest! {
             ..PlaceConfig::DEFAULT
         };
         let mut detector = PlaceDetector::<SONARS>::new();
-        detector.start(config, even_ring()).unwrap();
+        detector.start(config, reference::RING).unwrap();
         for (frame_index, echoes) in frames.iter().enumerate() {
             if let Some(place) = detector.observe(&RingFrame { echoes: *echoes }) {
                 prop_assert!(place.frame_index as usize <= frame_index);

@@ -10,6 +10,24 @@ use std::{
 const BACKLOG_BYTES: usize = 1 << 16;
 
 /// A TCP port at which a robot speaks and is spoken to.
+///
+/// ```
+/// use std::io::Read;
+/// use std::net::TcpStream;
+///
+/// use toposlam_host::broadcast::Broadcast;
+///
+/// let mut robot = Broadcast::bind("127.0.0.1:0")?;
+/// let mut laptop = TcpStream::connect(robot.address()?)?;
+/// while robot.listeners() == 0 {
+///     robot.exchange(&[]);
+/// }
+/// robot.exchange(b"what the robot says");
+/// let mut heard = [0; 19];
+/// laptop.read_exact(&mut heard)?;
+/// assert_eq!(&heard, b"what the robot says");
+/// # Ok::<(), std::io::Error>(())
+/// ```
 pub struct Broadcast {
     port: TcpListener,
     listeners: Vec<Connection>,

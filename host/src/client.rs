@@ -18,6 +18,18 @@ const BUFFER_BYTES: usize = 4096;
 ///
 /// A request whose reply does not come in time is sent again, which the robot executes once.
 /// All that is heard goes to the callback, replies included.
+///
+/// ```no_run
+/// use toposlam::wire::Command;
+/// use toposlam_host::{client::Client, line, wording};
+///
+/// let robot = line::open("tcp:127.0.0.1:7070", 115_200)?;
+/// let mut client = Client::new(robot, 1, |_, _| ());
+/// println!("{} vertices", client.map()?.vertices());
+/// println!("{}", wording::outcome(&client.request(Command::GoTo { vertex: 0 })?));
+/// std::fs::write("office.map", client.snapshot()?)?;
+/// # Ok::<(), anyhow::Error>(())
+/// ```
 pub struct Client<LINE, HEARD> {
     line: LINE,
     heard: HEARD,

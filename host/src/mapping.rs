@@ -1,4 +1,28 @@
 //! A map made on this computer by the very stages that run on the robot, with the log that a person wants of it.
+//!
+//! ```
+//! use toposlam::reference;
+//! use toposlam_host::mapping::{FilterChoice, Mapping};
+//! use toposlam_host::picture::{Drawing, draw};
+//! use toposlam_host::world::{Journal, Plan, RobotModel, Simulation};
+//!
+//! let plan = Plan::built_in("ring").expect("it is built in");
+//! let mut simulation = Simulation::new(&plan, RobotModel::default(), 7)?;
+//! let mut journal = Journal::new(simulation.true_map());
+//! let mut mapping = Mapping::start(reference::RING, FilterChoice::Robust)?;
+//! while mapping.steps().len() < 20 {
+//!     let (frame, truth) = simulation.next().expect("a simulation does not end");
+//!     journal.drive(&truth);
+//!     if let Some(step) = mapping.observe(&frame, truth.turn) {
+//!         journal.detect(&step.place);
+//!     }
+//! }
+//! let nodes: Vec<Option<usize>> = journal.detections().iter().map(|detection| detection.node).collect();
+//! assert!(mapping.score(simulation.true_map(), &nodes).location > 0.5);
+//! let map = Drawing::of_map(mapping.map(), &mapping.path(), journal.detections(), "after 20 places".to_owned());
+//! assert!(draw(&plan, simulation.true_map(), &map).starts_with("<svg"));
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
 
 use toposlam::place::Place;
 use toposlam::reference::{self, PaperReference, VERTICES};

@@ -34,6 +34,25 @@ pub enum Direction {
 ///
 /// `INDICES` is 1 for a [`History`](crate::History), whose labels read the same at every index of an n-gram, and 7 for
 /// an [`NgramTable`](crate::NgramTable). Memory: about `4 · (2 · INDICES + 9) · V · (WORDS + 1) + 56 · WORDS` bytes.
+///
+/// ```
+/// use toposlam::{Consistency, Direction, Fingerprint, History, Map, NgramLength};
+///
+/// // A corridor of three places, there and back; the last radius is 20 mm off.
+/// let radius = Fingerprint::from_radius_mm;
+/// let mut history = History::<1>::new();
+/// let mut map = Map::<16>::new();
+/// for radius_mm in [500, 800, 600, 800, 520] {
+///     history.push(radius(radius_mm)?);
+/// }
+/// let [a, b, c] = [500, 800, 600].map(|radius_mm| map.add_vertex(radius(radius_mm).unwrap()).unwrap());
+/// map.add_edge(a, b);
+/// map.add_edge(b, c);
+/// let (length, mut consistency) = (NgramLength::new(3)?, Consistency::<16, 1, 1>::new());
+/// let steps = consistency.distance_steps(&map, &history, length, Direction::HistoryToMap).unwrap();
+/// assert_eq!(steps * length.label_step_mm(), 20);
+/// # Ok::<(), Box<dyn core::error::Error>>(())
+/// ```
 #[derive(Clone, Debug)]
 pub struct Consistency<const V: usize, const WORDS: usize, const INDICES: usize> {
     readings: Readings<V, WORDS, INDICES>,

@@ -61,8 +61,3 @@ pub(crate) fn without(mut frame: RingFrame<16>, dead: impl Fn(usize) -> bool) ->
     }
     frame
 }
-
-#[test]
-fn the_simulated_ring_is_the_reference_robots() {
-    assert_eq!(toposlam_host::world::even_ring(), toposlam::reference::RING);
-}

@@ -2,13 +2,14 @@
 //!
 //! ```
 //! use toposlam::place::{PlaceConfig, PlaceDetector};
-//! use toposlam_host::world::{Journal, Plan, RobotModel, SONARS, Simulation, even_ring};
+//! use toposlam::ring::RingGeometry;
+//! use toposlam_host::world::{Journal, Plan, RobotModel, SONARS, Simulation};
 //!
 //! let plan = Plan::built_in("ring").expect("it is built in");
 //! let mut simulation = Simulation::new(&plan, RobotModel::default(), 7)?;
 //! let mut journal = Journal::new(simulation.true_map());
 //! let mut detector = PlaceDetector::<SONARS>::new();
-//! detector.start(PlaceConfig::DEFAULT, even_ring())?;
+//! detector.start(PlaceConfig::DEFAULT, RingGeometry::even())?;
 //! for (frame, truth) in simulation.by_ref().take(2000) {
 //!     journal.drive(&truth);
 //!     if let Some(place) = detector.observe(&frame) {
@@ -29,7 +30,7 @@ mod voronoi;
 pub use journal::{Detection, Journal, Report};
 pub use plan::{Plan, PlanError};
 pub use rover::{BodyModel, Rover};
-pub use sight::{SONARS, SonarModel, even_ring};
+pub use sight::{SONARS, SonarModel};
 pub use simulation::{Pose, RobotModel, Simulation, Truth};
 pub use voronoi::{TrueEdge, TrueMap, TrueNode, VoronoiError};
 

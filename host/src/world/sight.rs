@@ -4,12 +4,12 @@ use std::f64::consts::{PI, TAU};
 
 use rand::{Rng, RngExt};
 use rand_distr::{Distribution, StandardNormal};
-use toposlam::ring::{Echo, RingFrame, RingGeometry};
+use toposlam::ring::{Echo, RingFrame};
 
 use super::plan::Plan;
 use super::{Point, Pose};
 
-/// How many sonars the simulated ring has.
+/// How many sonars the simulated ring has: evenly spaced and counter-clockwise, the first straight ahead.
 pub const SONARS: usize = 16;
 /// Rays cast for each sonar's share of the turn; the cones overlap and share their rays.
 const RAYS_EACH: usize = 6;
@@ -49,11 +49,6 @@ impl Default for SonarModel {
             dead_sonars: 0,
         }
     }
-}
-
-/// The simulated ring: 16 sonars 22.5° apart, counter-clockwise, the first straight ahead.
-pub const fn even_ring() -> RingGeometry<SONARS> {
-    RingGeometry::even()
 }
 
 /// An angle brought into −π to π.
