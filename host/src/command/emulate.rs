@@ -12,13 +12,14 @@ use anyhow::{Context, bail, ensure};
 use clap::Args;
 use toposlam::drive::Suggestion;
 use toposlam::reference::SNAPSHOT_BYTES;
-use toposlam::wire::{Belief, Decoder, Evidence, Location, Message, Picture, Progress, Worst};
+use toposlam::wire::{Belief, Evidence, Location, Message, Worst};
 use toposlam_host::emulator::Emulation;
 use toposlam_host::exploration::Exploration;
 use toposlam_host::injector::FaultRates;
 
 use super::drive::{DriveArguments, Summary, fault_rate, progress_bar};
 use super::hardship;
+use super::heard::Heard;
 
 /// Where `cargo firmware` puts the image.
 const IMAGE: &str = "thumbv7em-none-eabihf/release/robot";
@@ -53,42 +54,6 @@ const SUGGESTION_TIMEOUT: Duration = Duration::from_secs(10);
 struct Repetition<'buffer> {
     exploration: Exploration<'buffer>,
     suggestions: Vec<Suggestion>,
-}
-
-/// What the firmware said.
-pub(super) struct Heard {
-    decoder: Decoder,
-    pub(super) picture: Picture<64>,
-    places: Vec<(u32, u16)>,
-}
-
-impl Heard {
-    pub(super) const fn new() -> Self {
-        Self { decoder: Decoder::new(), picture: Picture::new(), places: Vec::new() }
-    }
-
-    /// Takes bytes of the line, and hands on every message.
-    pub(super) fn feed(
-        &mut self,
-        bytes: &[u8],
-        mut on_message: impl FnMut(Message) -> ControlFlow<()>,
-    ) -> ControlFlow<()> {
-        let mut rest = bytes;
-        loop {
-            rest = match self.decoder.feed(rest) {
-                Progress::NeedsMore => return ControlFlow::Continue(()),
-                Progress::Error { rest, .. } => rest,
-                Progress::Message { header, message, rest } => {
-                    self.picture.apply(header, &message);
-                    if let Message::Place { place_index, radius_mm, .. } = message {
-                        self.places.push((place_index, radius_mm));
-                    }
-                    on_message(message)?;
-                    rest
-                }
-            };
-        }
-    }
 }
 
 pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {

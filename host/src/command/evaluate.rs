@@ -19,7 +19,8 @@ use toposlam_host::evaluation::{
     hints::Hints,
     prior::PriorSource,
     report::{Report, Row, SettingsReport},
-    run::{Filter, Settings, evaluate},
+    run::evaluate,
+    settings::{Filter, Settings},
 };
 
 /// Arguments of `toposlam evaluate`.

@@ -22,7 +22,7 @@ use toposlam_host::exploration::Exploration;
 use toposlam_host::injector::{FaultRates, LineInjector};
 
 use super::drive::{DriveArguments, Summary, progress_bar};
-use super::emulate::Heard;
+use super::heard::Heard;
 
 /// The world stands still for so long when the firmware does not say where it drives: a fault may have begun a frame for the
 /// sensors that is none for the firmware.

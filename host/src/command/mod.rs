@@ -10,6 +10,7 @@ pub(crate) mod export;
 mod filter;
 pub(crate) mod fleet;
 mod hardship;
+mod heard;
 mod interrupt;
 pub(crate) mod monitor;
 pub(crate) mod play;

@@ -3,7 +3,8 @@
 use super::{
     case::Case,
     environment::Place,
-    run::{Course, EvaluationError, Settings},
+    run::Course,
+    settings::{EvaluationError, Settings},
     trial::{Trial, Truth},
 };
 use serde::Serialize;

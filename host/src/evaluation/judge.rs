@@ -4,8 +4,8 @@ use super::{
     candidate::{Candidate, Start, VERTICES, prior_table},
     graph::Graph,
     prior::PriorSource,
-    run::Settings,
     score::{MapScore, is_localised, score_map_from},
+    settings::Settings,
     trial::{Trial, Truth},
 };
 use std::time::{Duration, Instant};
@@ -181,7 +181,7 @@ mod tests {
     use crate::evaluation::{
         candidate::Candidate,
         environment::{Environment, Place},
-        run::Filter,
+        settings::Filter,
         walk::all_walks,
     };
     use toposlam::{Fingerprint, Observation, RobustConfig};

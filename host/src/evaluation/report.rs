@@ -3,7 +3,7 @@
 use super::{
     case::Case,
     judge::{Judgement, PathResult},
-    run::{Filter, Settings},
+    settings::{Filter, Settings},
     walk::EXHAUSTIVE_FROM_LENGTH,
 };
 use serde::Serialize;

@@ -6,7 +6,7 @@ use super::{
     graph::Graph,
     hints::Hint,
     prior::PriorSource,
-    run::{Filter, Settings},
+    settings::{Filter, Settings},
     walk::{Walk, draw_walk, observe, path_rng, quantise},
 };
 use rand::{Rng, seq::SliceRandom};

@@ -7,7 +7,7 @@ pub(super) use paper::prior as prior_table;
 
 use super::{
     prior::{PriorSource, path_ngrams},
-    run::{EvaluationError, Filter, Settings},
+    settings::{EvaluationError, Filter, Settings},
     trial::Trial,
 };
 use toposlam::{ConfigError, Map, NgramLength, Observation};
@@ -51,7 +51,7 @@ pub fn choose(settings: &Settings, explored: usize) -> Result<Start, EvaluationE
         PriorSource::Exploration => explored,
     };
     if ngrams > MAX_NGRAMS {
-        return Err(EvaluationError::TooManyNgrams);
+        return Err(EvaluationError::TooManyNgrams { most: MAX_NGRAMS });
     }
     match settings.filter {
         Filter::Paper(config) => {

@@ -4,7 +4,7 @@ use super::{Candidate, Start, VERTICES};
 use crate::evaluation::{
     ancestry::Ancestry,
     prior::{PriorSource, path_prior, table_prior},
-    run::{EvaluationError, Filter, Settings},
+    settings::{EvaluationError, Filter, Settings},
     trial::Trial,
 };
 use std::ptr;

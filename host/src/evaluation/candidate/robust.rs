@@ -2,7 +2,7 @@
 
 use super::{Candidate, Start, VERTICES};
 use crate::evaluation::{
-    run::{EvaluationError, Filter, Settings},
+    settings::{EvaluationError, Filter, Settings},
     trial::Trial,
 };
 use toposlam::{FaultKind, Fingerprint, Map, Observation, RobustConfig, RobustFilter};

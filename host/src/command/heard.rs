@@ -1,0 +1,41 @@
+//! What the emulated firmware says on its line.
+
+use std::ops::ControlFlow;
+
+use toposlam::wire::{Decoder, Message, Picture, Progress};
+
+/// What the firmware said.
+pub(super) struct Heard {
+    pub(super) decoder: Decoder,
+    pub(super) picture: Picture<64>,
+    pub(super) places: Vec<(u32, u16)>,
+}
+
+impl Heard {
+    pub(super) const fn new() -> Self {
+        Self { decoder: Decoder::new(), picture: Picture::new(), places: Vec::new() }
+    }
+
+    /// Takes bytes of the line, and hands on every message.
+    pub(super) fn feed(
+        &mut self,
+        bytes: &[u8],
+        mut on_message: impl FnMut(Message) -> ControlFlow<()>,
+    ) -> ControlFlow<()> {
+        let mut rest = bytes;
+        loop {
+            rest = match self.decoder.feed(rest) {
+                Progress::NeedsMore => return ControlFlow::Continue(()),
+                Progress::Error { rest, .. } => rest,
+                Progress::Message { header, message, rest } => {
+                    self.picture.apply(header, &message);
+                    if let Message::Place { place_index, radius_mm, .. } = message {
+                        self.places.push((place_index, radius_mm));
+                    }
+                    on_message(message)?;
+                    rest
+                }
+            };
+        }
+    }
+}
