@@ -20,6 +20,7 @@ import unittest
 from pathlib import Path
 
 from frames import frame, varint
+from requirement import require
 
 REPOSITORY = Path(__file__).resolve().parents[2]
 TOPOSLAM = os.environ.get("TOPOSLAM", str(REPOSITORY / "target" / "debug" / "toposlam"))
@@ -57,11 +58,7 @@ if not RERUN.exists():
 
 
 def setUpModule() -> None:
-    if missing:
-        if os.environ.get("CI") == "true":
-            raise RuntimeError(f"missing: {', '.join(missing)}")
-        print(f"SKIPPED: the recordings were not read by other programs; missing: {', '.join(missing)}")
-        raise unittest.SkipTest("something is missing")
+    require(missing, "the recordings were not read by other programs")
 
 
 def run(*arguments: str) -> str:

@@ -16,6 +16,7 @@ import unittest
 from pathlib import Path
 
 from frames import frame, varint
+from requirement import require
 
 REPOSITORY = Path(__file__).resolve().parents[2]
 TOPOSLAM = os.environ.get("TOPOSLAM", str(REPOSITORY / "target" / "debug" / "toposlam"))
@@ -37,11 +38,7 @@ except ImportError as error:
 
 
 def setUpModule() -> None:
-    if missing:
-        if os.environ.get("CI") == "true":
-            raise RuntimeError(f"missing: {', '.join(missing)}")
-        print(f"SKIPPED: no browser has shown the page; missing: {', '.join(missing)}")
-        raise unittest.SkipTest("something is missing")
+    require(missing, "no browser has shown the page")
 
 
 class Program:
