@@ -31,6 +31,15 @@ pub enum Event<'listener> {
     Damaged(DecodeError),
 }
 
+impl<'a> From<&'a Result<(Header, Message), DecodeError>> for Event<'a> {
+    fn from(kept: &'a Result<(Header, Message), DecodeError>) -> Self {
+        match kept {
+            Ok((header, message)) => Self::Message(*header, message),
+            Err(error) => Self::Damaged(*error),
+        }
+    }
+}
+
 /// All that is known of a robot from what it said. Memory: some 2 KiB, and nothing on the heap.
 #[derive(Clone, Debug)]
 pub struct Listener {

@@ -8,7 +8,6 @@ use anyhow::{Context, ensure};
 use serde_json::{Value, json};
 
 use crate::link::{Link, News, Options, Source};
-use crate::listener::Event;
 use crate::{json, wording};
 
 /// News that wait to be written; a link that has more to say waits.
@@ -85,8 +84,7 @@ fn in_words(news: &News, name: &str) -> String {
         News::Connected => format!("connected to {name}"),
         News::Disconnected(reason) => format!("no line to {name}: {reason}; trying again"),
         News::Ended => "the input has ended".to_owned(),
-        News::Heard(Ok((header, message)), _) => wording::event(Event::Message(*header, message)),
-        News::Heard(Err(error), _) => wording::event(Event::Damaged(*error)),
+        News::Heard(event, _) => wording::event(event.into()),
         News::Answered(task, answer) => format!("{task}: {answer:?}"),
     }
 }
@@ -96,8 +94,7 @@ fn as_json(news: &News, name: &str) -> Value {
         News::Connected => json!({"event": "Connected", "line": name}),
         News::Disconnected(reason) => json!({"event": "Disconnected", "line": name, "reason": reason}),
         News::Ended => json!({"event": "Ended", "line": name}),
-        News::Heard(Ok((header, message)), _) => json::event(Event::Message(*header, message)),
-        News::Heard(Err(error), _) => json::event(Event::Damaged(*error)),
+        News::Heard(event, _) => json::event(event.into()),
         News::Answered(task, answer) => {
             json!({"event": "Answered", "task": task.to_string(), "answer": format!("{answer:?}")})
         }

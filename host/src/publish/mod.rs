@@ -150,10 +150,7 @@ impl Publisher {
             News::Connected => retained.set_status(ONLINE),
             News::Disconnected(_) | News::Ended => retained.set_status(OFFLINE),
             News::Heard(event, listener) => {
-                let event = match event {
-                    Ok((header, message)) => Event::Message(*header, message),
-                    Err(error) => Event::Damaged(*error),
-                };
+                let event = Event::from(event);
                 if changes_map(event) && listener.picture().is_converged() {
                     retained.set_map(map_json(listener).to_string());
                 }
