@@ -112,7 +112,10 @@ fn robot(
             let map = [Message::Row(row), Message::Map { vertices: 1, edges: 1, digest }];
             for message in reply.map(Message::Reply).into_iter().chain(map) {
                 let frame = encoder.encode(&message, &mut [0; MAX_FRAME_BYTES]).unwrap().to_vec();
-                stream.write_all(&frame).unwrap();
+                // A client that has its answer does not wait for the rest.
+                if stream.write_all(&frame).is_err() {
+                    return commands;
+                }
             }
         }
     });
