@@ -4,9 +4,10 @@
 //! obstacles at equal range. Where a third comes as close it is at a *meet point*: a junction, a bend, or the end of a
 //! corridor, whose front wall is then as close as the walls beside. The common range is the place's fingerprint.
 //!
-//! Each sensor is smoothed by the median of its last three readings, so that one missed echo changes nothing. The
-//! closest obstacle is the nearest range of the ring, the next the nearest at least `separation_mrad` away from it, and
-//! so on. The *spread* is how much farther the third is than the first: it falls to the noise at the meet point and
+//! Each sensor is smoothed by the median of its last three readings, and two echoes among four are heard, so that a
+//! missed echo changes nothing; where a sensor is dead between two that hear about the same, it is taken to hear it too. The
+//! closest obstacle is the nearest range of the ring, the next the nearest at least `separation_mrad` away from it that is no
+//! part of the same wall, heard from along it, and so on. The *spread* is how much farther the third is than the first: it falls to the noise at the meet point and
 //! rises again behind it. A frame within `equidistance_mm` shows a meet point; enough of them confirm it; when they
 //! end, the place is reported once; the next is looked for after the spread has risen beyond `leave_mm`.
 //!
@@ -36,9 +37,10 @@ pub(crate) mod scan;
 
 pub use config::{PlaceConfig, PlaceConfigError};
 
+use crate::bearing::turn_mrad;
 use crate::ring::{Echo, RingFrame, RingGeometry};
 use crate::{FaultCounters, FaultKind, Fingerprint};
-use scan::{DEAD, Meeting, SILENT, Scan};
+use scan::{DEAD, Meeting, SILENT, Scan, is_echo};
 
 /// How many frames the radius is averaged over.
 const KEPT: usize = 8;
@@ -76,16 +78,21 @@ impl Sighting {
 /// Turns the frames of a ring of `SONARS` sensors into places.
 ///
 /// The ranges are taken from the robot's centre; add the radius of the ring if the sensors measure from its rim.
-/// Memory: about `8 · SONARS + 160` bytes. Time for each frame: `O(SONARS)`, at most six passes over the ring.
+/// Memory: about `12 · SONARS + 160` bytes. Time for each frame: at most six passes over the ring, `O(SONARS)` each; where most
+/// sensors are dead, up to `O(SONARS²)`.
 #[derive(Clone, Debug)]
 pub struct PlaceDetector<const SONARS: usize> {
     config: PlaceConfig,
+    /// The sensors counter-clockwise, by their number in the frame, and where they look.
+    round: [u16; SONARS],
     geometry: RingGeometry<SONARS>,
     started: bool,
+    /// Whether too few sensors of the newest frame live.
+    blind: bool,
     /// The newest frame, smoothed.
     smooth_mm: [u16; SONARS],
-    /// The last two frames, as smoothing reads them.
-    earlier_mm: [[u16; SONARS]; 2],
+    /// The three frames before, as smoothing reads them.
+    earlier_mm: [[u16; SONARS]; 3],
     frame_index: u32,
     /// Whether the robot is still at the place that was reported last.
     leaving: bool,
@@ -103,10 +110,12 @@ impl<const SONARS: usize> PlaceDetector<SONARS> {
     pub const fn new() -> Self {
         Self {
             config: PlaceConfig::UNSET,
+            round: [0; SONARS],
             geometry: RingGeometry { bearings_mrad: [0; SONARS] },
             started: false,
+            blind: false,
             smooth_mm: [DEAD; SONARS],
-            earlier_mm: [[DEAD; SONARS]; 2],
+            earlier_mm: [[DEAD; SONARS]; 3],
             frame_index: 0,
             leaving: false,
             sighted: 0,
@@ -128,10 +137,20 @@ impl<const SONARS: usize> PlaceDetector<SONARS> {
             return Err(PlaceConfigError::Bearing);
         }
         self.config = config;
-        self.geometry = geometry;
+        for (sensor, bearing_mrad) in (0_u16..).zip(geometry.bearings_mrad) {
+            let before = (0_u16..).zip(geometry.bearings_mrad).filter(|&(other, other_mrad)| {
+                other_mrad < bearing_mrad || other_mrad == bearing_mrad && other < sensor
+            });
+            let position = before.count();
+            if let (Some(number), Some(looks_mrad)) =
+                (self.round.get_mut(position), self.geometry.bearings_mrad.get_mut(position))
+            {
+                (*number, *looks_mrad) = (sensor, bearing_mrad);
+            }
+        }
         self.started = true;
         self.smooth_mm = [DEAD; SONARS];
-        self.earlier_mm = [[DEAD; SONARS]; 2];
+        self.earlier_mm = [[DEAD; SONARS]; 3];
         self.frame_index = 0;
         self.leaving = false;
         self.faults = FaultCounters::new();
@@ -160,7 +179,10 @@ impl<const SONARS: usize> PlaceDetector<SONARS> {
         let frame_index = self.frame_index;
         self.frame_index = self.frame_index.saturating_add(1);
         self.smooth_mm = self.smooth(frame);
-        if self.is_blind() {
+        let live = self.smooth_mm.iter().filter(|range_mm| **range_mm != DEAD).count();
+        self.blind = live < usize::from(self.config.live_sensors_min);
+        self.bridge();
+        if self.blind {
             self.faults.count(FaultKind::RingBlind);
             return None;
         }
@@ -179,9 +201,8 @@ impl<const SONARS: usize> PlaceDetector<SONARS> {
     }
 
     /// Whether too few sensors of the newest frame live to look for a place, or to drive by.
-    pub(crate) fn is_blind(&self) -> bool {
-        let live = self.smooth_mm.iter().filter(|range_mm| **range_mm != DEAD).count();
-        live < usize::from(self.config.live_sensors_min)
+    pub(crate) const fn is_blind(&self) -> bool {
+        self.blind
     }
 
     /// Whether the robot is still at the place that was reported last.
@@ -202,11 +223,30 @@ impl<const SONARS: usize> PlaceDetector<SONARS> {
         &self.faults
     }
 
-    /// The median of the last three readings of each sensor.
+    /// Between two sensors that hear something about as near a dead one is taken to hear it as well: a wall must not fall into two
+    /// obstacles where a sensor is missing.
+    fn bridge(&mut self) {
+        let ranges_mm = self.smooth_mm;
+        let beside = |index: usize| Some((*ranges_mm.get(index)?, *self.geometry.bearings_mrad.get(index)?));
+        for (index, range_mm) in self.smooth_mm.iter_mut().enumerate() {
+            let (before, after) = ((index + SONARS - 1) % SONARS, (index + 1) % SONARS);
+            let (Some((before_mm, from_mrad)), Some((after_mm, to_mrad))) = (beside(before), beside(after)) else {
+                continue;
+            };
+            let is_gap_narrow = turn_mrad(from_mrad, to_mrad).abs() <= i32::from(self.config.separation_mrad);
+            let hear_the_same =
+                is_echo(before_mm) && is_echo(after_mm) && before_mm.abs_diff(after_mm) <= self.config.equidistance_mm;
+            if *range_mm == DEAD && is_gap_narrow && hear_the_same {
+                *range_mm = before_mm / 2 + after_mm / 2;
+            }
+        }
+    }
+
+    /// What each sensor has heard lately.
     fn smooth(&mut self, frame: &RingFrame<SONARS>) -> [u16; SONARS] {
         let mut now_mm = [DEAD; SONARS];
-        for (now_mm, echo) in now_mm.iter_mut().zip(frame.echoes) {
-            *now_mm = match echo {
+        for (now_mm, &sensor) in now_mm.iter_mut().zip(&self.round) {
+            *now_mm = match frame.echoes.get(usize::from(sensor)).copied().unwrap_or(Echo::Dead) {
                 Echo::Dead => DEAD,
                 Echo::Silence => SILENT,
                 Echo::Range { range_mm } if range_mm < self.config.range_min_mm => {
@@ -217,17 +257,12 @@ impl<const SONARS: usize> PlaceDetector<SONARS> {
                 Echo::Range { range_mm } => range_mm,
             };
         }
-        let [before_mm, long_before_mm] = self.earlier_mm;
-        self.earlier_mm = [now_mm, before_mm];
+        let [before_mm, long_before_mm, first_mm] = self.earlier_mm;
+        self.earlier_mm = [now_mm, before_mm, long_before_mm];
         let mut smooth_mm = now_mm;
-        for ((smooth_mm, before_mm), long_before_mm) in smooth_mm.iter_mut().zip(before_mm).zip(long_before_mm) {
-            *smooth_mm = match (*smooth_mm, before_mm, long_before_mm) {
-                (DEAD, _, _) => DEAD,
-                (now_mm, DEAD, DEAD) => now_mm,
-                // Of two the shorter: a sensor misses an obstacle more often than it invents one.
-                (now_mm, DEAD, other_mm) | (now_mm, other_mm, DEAD) => now_mm.min(other_mm),
-                (a, b, c) => a.min(b).max(a.max(b).min(c)),
-            };
+        let earlier_mm = before_mm.into_iter().zip(long_before_mm).zip(first_mm);
+        for (smooth_mm, ((before_mm, long_before_mm), first_mm)) in smooth_mm.iter_mut().zip(earlier_mm) {
+            *smooth_mm = smoothed(*smooth_mm, before_mm, long_before_mm, first_mm);
         }
         smooth_mm
     }
@@ -310,6 +345,21 @@ impl<const SONARS: usize> PlaceDetector<SONARS> {
 impl<const SONARS: usize> Default for PlaceDetector<SONARS> {
     fn default() -> Self {
         Self::new()
+    }
+}
+
+/// The median of a sensor's last three readings, the newest first, or the shortest where the median is silence but two of the last
+/// four are echoes: a sensor misses an obstacle more often than it invents one.
+fn smoothed(now_mm: u16, before_mm: u16, long_before_mm: u16, first_mm: u16) -> u16 {
+    match (now_mm, before_mm, long_before_mm) {
+        (DEAD, _, _) => DEAD,
+        (_, DEAD, DEAD) => now_mm,
+        (_, DEAD, other_mm) | (_, other_mm, DEAD) => now_mm.min(other_mm),
+        _ => {
+            let median_mm = now_mm.min(before_mm).max(now_mm.max(before_mm).min(long_before_mm));
+            let is_missed = median_mm == SILENT && is_echo(first_mm);
+            if is_missed { now_mm.min(before_mm).min(long_before_mm) } else { median_mm }
+        }
     }
 }
 

@@ -12,6 +12,10 @@ pub(crate) const OBSTACLES: usize = 6;
 /// A way leads on where a sensor looks beyond this share of the radius, in percent.
 const OPEN_PERCENT: u32 = 160;
 
+/// Beside an echo from along a wall the wall is this share of it away, in percent: nearer by more than noise, and by less than what
+/// stands before something else.
+const SLOPE_PERCENT: core::ops::Range<u32> = 67..92;
+
 /// What the ring hears, as the place detector and the drive read it.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Scan<'a, const SONARS: usize> {
@@ -87,6 +91,32 @@ impl<const SONARS: usize> Scan<'_, SONARS> {
         heard.min_by_key(|(range_mm, _)| *range_mm).map(|echo| self.obstacle(echo))
     }
 
+    /// The obstacle of the nearest echo that is apart from those found before, and no part of them.
+    fn nearest_apart(&self, is_apart: impl Fn(i16) -> bool) -> Option<Obstacle> {
+        let mut nearest = None;
+        for (index, (range_mm, bearing_mrad)) in self.echoes().enumerate() {
+            let goes_on = |step| self.goes_on(index, range_mm, step, &is_apart);
+            // What decides most costs least.
+            let is_nearer = is_echo(range_mm) && nearest.is_none_or(|(nearest_mm, _)| range_mm < nearest_mm);
+            if is_nearer && is_apart(bearing_mrad) && !goes_on(1) && !goes_on(SONARS - 1) {
+                nearest = Some((range_mm, bearing_mrad));
+            }
+        }
+        nearest.map(|echo| self.obstacle(echo))
+    }
+
+    /// Whether an echo is a part of an obstacle that was found before: a wall is heard from along it as well, and that echo is
+    /// farther than the one beside it, in steps of `step` sensors round the ring. What is dead in between says nothing.
+    fn goes_on(&self, index: usize, range_mm: u16, step: usize, is_apart: impl Fn(i16) -> bool) -> bool {
+        let beside = (1..SONARS).map(|steps| (index + steps * step) % SONARS);
+        let mut beside =
+            beside.filter_map(|index| self.echoes().nth(index)).filter(|&(beside_mm, _)| beside_mm != DEAD);
+        beside.next().is_some_and(|(beside_mm, bearing_mrad)| {
+            let share_percent = (u32::from(beside_mm) * 100).checked_div(range_mm.into()).unwrap_or(0);
+            !is_apart(bearing_mrad) && SLOPE_PERCENT.contains(&share_percent)
+        })
+    }
+
     /// The obstacle that an echo belongs to, its bearing the middle of the live sensors within half the separation that
     /// hear it about as near. Which of them hears it nearest is chance.
     fn obstacle(&self, (range_mm, bearing_mrad): (u16, i16)) -> Obstacle {
@@ -107,7 +137,7 @@ impl<const SONARS: usize> Scan<'_, SONARS> {
 
     /// Finds the closest obstacles: the nearest echo first, then the nearest at least the separation from all before.
     ///
-    /// Time O(SONARS) for each of at most six obstacles.
+    /// Time O(SONARS) for each of at most six obstacles, and up to O(SONARS²) where most sensors are dead.
     pub(crate) fn closest(&self) -> Closest {
         let mut closest = Closest { obstacles: [Obstacle::default(); OBSTACLES], len: 0, equidistant: 0 };
         let mut nearest_mm = None;
@@ -118,7 +148,7 @@ impl<const SONARS: usize> Scan<'_, SONARS> {
                     turn_mrad(obstacle.bearing_mrad, bearing_mrad).abs() >= i32::from(self.separation_mrad)
                 })
             };
-            let Some(next) = self.nearest(apart) else { break };
+            let Some(next) = self.nearest_apart(apart) else { break };
             let nearest_mm = *nearest_mm.get_or_insert(next.range_mm);
             if let Some(slot) = closest.obstacles.get_mut(number) {
                 *slot = next;
@@ -261,5 +291,24 @@ mod tests {
             assert!(ways.nearest(expected_mrad, 4).is_some(), "{expected_mrad} in {ways:?}");
         }
         assert!(ways.bearings_mrad().is_sorted());
+    }
+
+    #[test]
+    fn a_wall_that_is_heard_from_along_it_is_one_obstacle() {
+        // Two walls 600 mm aside, heard up to 35° off their normal; the robot looks 5° aside and hears the left wall nearest where it
+        // lies 12.5° off the normal.
+        let ring = RingGeometry::<16>::even();
+        let mut ranges_mm = [SILENT; 16];
+        for (index, range_mm) in
+            [(2, 732), (3, 614), (4, 600), (5, 595), (6, 662), (11, 662), (12, 600), (13, 601), (14, 614)]
+        {
+            ranges_mm[index] = range_mm;
+        }
+        let scan = Scan { ranges_mm: &ranges_mm, geometry: &ring, separation_mrad: 1047, equidistance_mm: 150 };
+        assert_eq!(scan.closest().iter().count(), 2, "{:?}", scan.closest());
+        // The same echo with nothing heard beside it is an obstacle of its own.
+        ranges_mm[3] = SILENT;
+        let scan = Scan { ranges_mm: &ranges_mm, geometry: &ring, separation_mrad: 1047, equidistance_mm: 150 };
+        assert_eq!(scan.closest().iter().count(), 3, "{:?}", scan.closest());
     }
 }

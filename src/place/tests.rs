@@ -157,3 +157,57 @@ fn a_bearing_beyond_half_a_turn_is_refused() {
     let refused = PlaceDetector::<16>::new().start(PlaceConfig::DEFAULT, geometry);
     assert_eq!(refused, Err(PlaceConfigError::Bearing));
 }
+
+/// A robot in a corridor 1.6 m wide that looks so far to the left, and hears its walls up to 25° off their normal in cones of 30°,
+/// with an error of up to 40 mm.
+fn askew(heading_deg: i32, random: &mut u32) -> RingFrame<16> {
+    let mut frame = RingFrame { echoes: [Echo::Silence; 16] };
+    for (echo, axis_deg) in frame.echoes.iter_mut().zip((0..).map(|sonar| f64::from(sonar) * 22.5)) {
+        for normal_deg in [90.0, -90.0] {
+            let off_deg = (axis_deg + f64::from(heading_deg) - normal_deg + 540.0).rem_euclid(360.0) - 180.0;
+            let incidence_deg = (off_deg.abs() - 15.0).max(0.0);
+            if incidence_deg <= 25.0 {
+                *random = random.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+                let error_mm = (*random >> 16) as u16 % 81;
+                *echo = Echo::Range { range_mm: (760.0 / incidence_deg.to_radians().cos()) as u16 + error_mm };
+            }
+        }
+    }
+    frame
+}
+
+#[test]
+fn a_corridor_is_no_place_to_a_ring_with_a_dead_sensor_in_whatever_order_the_sensors_are_given() {
+    for (dead, step) in (0..16).flat_map(|dead| [(dead, 1), (dead, 5)]) {
+        let shuffled = |sensor: usize| sensor * step % 16;
+        let in_order = corridor::<16>(6000).0.bearings_mrad;
+        let geometry = RingGeometry { bearings_mrad: core::array::from_fn(|sensor| in_order[shuffled(sensor)]) };
+        let mut detector = PlaceDetector::<16>::new();
+        detector.start(PlaceConfig::DEFAULT, geometry).unwrap();
+        let mut random = 1;
+        for frame in 0..2000 {
+            let mut in_order = askew((frame / 8) % 23 - 11, &mut random).echoes;
+            in_order[dead] = Echo::Dead;
+            let echoes = core::array::from_fn(|sensor| in_order[shuffled(sensor)]);
+            let place = detector.observe(&RingFrame { echoes });
+            assert_eq!(place, None, "with sensor {dead} dead, in steps of {step}, at frame {frame}");
+        }
+    }
+}
+
+#[test]
+fn two_echoes_among_four_readings_are_heard_and_one_is_not() {
+    let heard = |readings: [u16; 4]| {
+        let [first_mm, long_before_mm, before_mm, now_mm] = readings;
+        smoothed(now_mm, before_mm, long_before_mm, first_mm)
+    };
+    assert_eq!(heard([900, 910, 920, 930]), 920);
+    assert_eq!(heard([900, SILENT, 920, 930]), 930);
+    assert_eq!(heard([900, SILENT, SILENT, 930]), 930);
+    assert_eq!(heard([900, SILENT, 920, SILENT]), 920);
+    assert_eq!(heard([SILENT, SILENT, 920, SILENT]), SILENT);
+    assert_eq!(heard([900, SILENT, SILENT, SILENT]), SILENT);
+    assert_eq!(heard([900, DEAD, DEAD, SILENT]), SILENT);
+    assert_eq!(heard([900, 910, DEAD, SILENT]), 910);
+    assert_eq!(heard([900, 910, 920, DEAD]), DEAD);
+}
