@@ -17,6 +17,7 @@ mod departures;
 mod navigator;
 mod pilot;
 mod steering;
+mod turning;
 mod wheels;
 
 pub use config::{DriveConfig, DriveConfigError};

@@ -1,15 +1,21 @@
 //! Driving from place to place: along an edge, up to the meet point, out by the way that was chosen.
 
 use super::steering::{Beside, along_edge, meet_point};
+use super::turning::Turning;
 use super::{DriveConfig, DriveConfigError, Suggestion};
-use crate::bearing::{HALF_TURN_MRAD, turn_mrad};
-use crate::place::scan::{SILENT, Scan, Ways};
+use crate::bearing::{HALF_TURN_MRAD, turn_mrad, turned};
+use crate::place::scan::{Closest, DEAD, Obstacle, SILENT, Scan, Ways};
 use crate::{FaultCounters, FaultKind, Turn};
 
 /// A way is the one that was meant when its bearing has moved by less since the last frame, in milliradians.
 const SAME_WAY_MRAD: i32 = 700;
 /// The robot faces a way that is this near to straight ahead, in milliradians.
 const FACING_MRAD: i32 = 200;
+/// Where the sonars that look straight ahead are dead, those this far aside have to do, in milliradians.
+const BESIDE_DEAD_MRAD: i32 = 600;
+/// A robot whose sonars ahead are dead sways so far to either side, in milliradians, for so many frames, a power of two.
+const SWAY_MRAD: i16 = 260;
+const SWAY_FRAMES: u16 = 8;
 /// So long the pilot waits at a place for a frame with as many ways as the detector counted.
 const LOOK_FRAMES: u16 = 12;
 /// So long after it set off the robot is still at the place: what the ring hears while an obstacle hides for a moment must not
@@ -62,7 +68,7 @@ enum Left {
     On,
 }
 
-/// The pilot's state: some 40 bytes.
+/// The pilot's state: some 60 bytes.
 #[derive(Clone, Debug)]
 pub(super) struct Pilot {
     config: DriveConfig,
@@ -72,6 +78,7 @@ pub(super) struct Pilot {
     /// Where the way lies by which the robot came, and the one by which it leaves.
     back_mrad: i16,
     target_mrad: i16,
+    turning: Turning,
     /// What the detector counted at the place.
     degree: Option<u8>,
     left: Left,
@@ -86,6 +93,7 @@ impl Pilot {
             frames: 0,
             back_mrad: 0,
             target_mrad: 0,
+            turning: Turning::new(),
             degree: None,
             left: Left::Unknown,
             faults: FaultCounters::new(),
@@ -157,12 +165,14 @@ impl Pilot {
         choose: impl FnOnce(WaysOut) -> Option<u8>,
     ) -> Suggestion {
         self.frames = self.frames.saturating_add(1);
+        let closest = scan.closest();
+        self.turning.feel(&closest);
         match self.state {
-            PilotState::Follow => self.follow(scan, leaving),
-            PilotState::Home => self.home(scan),
-            PilotState::Look => self.look(scan, choose),
-            PilotState::Face => self.face(scan),
-            PilotState::Leave => self.leave(scan, leaving),
+            PilotState::Follow => self.follow(scan, &closest, leaving),
+            PilotState::Home => self.home(scan, &closest),
+            PilotState::Look => self.look(scan, &closest, choose),
+            PilotState::Face => self.face(scan, &closest),
+            PilotState::Leave => self.leave(scan, &closest, leaving),
             PilotState::Escape => self.escape(scan),
             PilotState::Stand => Suggestion::STAND,
         }
@@ -189,32 +199,38 @@ impl Pilot {
 
     fn escape<const SONARS: usize>(&mut self, scan: &Scan<'_, SONARS>) -> Suggestion {
         // Without odometry the robot knows that it has turned by what it hears ahead.
-        let ahead = scan.nearest(|bearing_mrad| i32::from(bearing_mrad).abs() < FACING_MRAD);
-        let is_free = ahead.is_none_or(|ahead| ahead.range_mm > self.config.clearance_mm.saturating_mul(2));
+        let is_free = ahead(scan).is_none_or(|ahead| ahead.range_mm > self.config.clearance_mm.saturating_mul(2));
         if is_free && self.frames > 5 || self.is_out_of_patience() {
             self.enter(PilotState::Follow);
         }
         Suggestion { heading_mrad: if self.target_mrad < 0 { -1571 } else { 1571 }, speed_permille: 0 }
     }
 
-    fn follow<const SONARS: usize>(&mut self, scan: &Scan<'_, SONARS>, leaving: bool) -> Suggestion {
-        let closest = scan.closest();
+    fn follow<const SONARS: usize>(&mut self, scan: &Scan<'_, SONARS>, closest: &Closest, leaving: bool) -> Suggestion {
         if !leaving && closest.spread_mm() <= scan.equidistance_mm {
             self.back_mrad = HALF_TURN_MRAD;
             self.enter(PilotState::Home);
-            return self.home(scan);
+            return self.home(scan, closest);
         }
         self.drive(scan, Beside::EDGE, closest.spread_mm())
     }
 
     fn drive<const SONARS: usize>(&mut self, scan: &Scan<'_, SONARS>, beside: Beside, spread_mm: u16) -> Suggestion {
-        let ahead = scan.nearest(|bearing_mrad| i32::from(bearing_mrad).abs() < i32::from(FACING_MRAD as i16));
-        if ahead.is_some_and(|ahead| ahead.range_mm < self.config.clearance_mm) {
+        if ahead(scan).is_some_and(|ahead| ahead.range_mm < self.config.clearance_mm) {
             return self.give_up(scan);
         }
         let heading_mrad = along_edge(scan, beside, self.config.look_ahead_mm).unwrap_or(0);
-        let heading_mrad = heading_mrad.clamp(-BEND_MRAD, BEND_MRAD);
+        let heading_mrad = heading_mrad.clamp(-BEND_MRAD, BEND_MRAD).saturating_add(self.sway_mrad(scan));
         Suggestion { heading_mrad, speed_permille: self.slowed(spread_mm) }
+    }
+
+    /// Where the sonar ahead is dead, a robot that sways looks with those beside it at what it would not see otherwise.
+    fn sway_mrad<const SONARS: usize>(&self, scan: &Scan<'_, SONARS>) -> i16 {
+        match (ahead_mrad(scan) > FACING_MRAD, self.frames & SWAY_FRAMES == 0) {
+            (false, _) => 0,
+            (true, true) => SWAY_MRAD,
+            (true, false) => -SWAY_MRAD,
+        }
     }
 
     /// The speed so far from a meet point.
@@ -225,17 +241,16 @@ impl Pilot {
         (share as u16).max(creep)
     }
 
-    fn home<const SONARS: usize>(&mut self, scan: &Scan<'_, SONARS>) -> Suggestion {
-        let closest = scan.closest();
+    fn home<const SONARS: usize>(&mut self, scan: &Scan<'_, SONARS>, closest: &Closest) -> Suggestion {
         if self.is_out_of_patience() {
             return self.give_up(scan);
         }
         if closest.spread_mm() > scan.equidistance_mm.saturating_mul(2) && closest.spread_mm() != SILENT {
             self.enter(PilotState::Follow);
-            return self.follow(scan, false);
+            return self.follow(scan, closest, false);
         }
-        self.track_back(&scan.ways(&closest));
-        match meet_point(&closest) {
+        self.track_back(&scan.ways(closest));
+        match meet_point(closest) {
             Some(way) if way.length() > i32::from(self.config.arrive_mm) => {
                 let heading_mrad = way.bearing_mrad();
                 // What lies behind has been passed, and turning round for it would cost the bearing of the way back.
@@ -244,6 +259,10 @@ impl Pilot {
                 }
                 let way_mm = way.length().clamp(0, i32::from(BRAKE_MM)) as u16;
                 Suggestion { heading_mrad, speed_permille: self.slowed(way_mm) }
+            }
+            // The third obstacle may hide before a dead sonar.
+            None if self.frames > LOOK_FRAMES && scan.echoes().any(|(range_mm, _)| range_mm == DEAD) => {
+                Suggestion { heading_mrad: FACING_MRAD as i16, speed_permille: 0 }
             }
             _ => Suggestion::STAND,
         }
@@ -259,9 +278,10 @@ impl Pilot {
     fn look<const SONARS: usize>(
         &mut self,
         scan: &Scan<'_, SONARS>,
+        closest: &Closest,
         choose: impl FnOnce(WaysOut) -> Option<u8>,
     ) -> Suggestion {
-        let ways = scan.ways(&scan.closest());
+        let ways = scan.ways(closest);
         self.track_back(&ways);
         let bearings_mrad = ways.bearings_mrad();
         let count = bearings_mrad.len();
@@ -285,34 +305,54 @@ impl Pilot {
         let index = (back.unwrap_or(0) + usize::from(chosen)).checked_rem(count).unwrap_or(0);
         self.target_mrad = bearings_mrad.get(index).copied().unwrap_or(0);
         self.enter(PilotState::Face);
-        self.face(scan)
+        self.face(scan, closest)
     }
 
-    fn face<const SONARS: usize>(&mut self, scan: &Scan<'_, SONARS>) -> Suggestion {
+    fn face<const SONARS: usize>(&mut self, scan: &Scan<'_, SONARS>, closest: &Closest) -> Suggestion {
         if self.is_out_of_patience() {
             return self.give_up(scan);
         }
-        if let Some((_, target_mrad)) = scan.ways(&scan.closest()).nearest(self.target_mrad, SAME_WAY_MRAD) {
-            // Straight behind, noise must not change the sense of turning.
-            let is_behind = turn_mrad(HALF_TURN_MRAD, target_mrad).abs() < SAME_WAY_MRAD;
-            let turns_over = (target_mrad < 0) != (self.target_mrad < 0);
-            self.target_mrad = if is_behind && turns_over { self.target_mrad } else { target_mrad };
+        // A way that is not seen in this frame is where the turn of the ring has brought it.
+        let expected_mrad = turned(self.target_mrad, self.turning.by_mrad());
+        let seen = scan.ways(closest).nearest(expected_mrad, SAME_WAY_MRAD);
+        let target_mrad = seen.map_or(expected_mrad, |(_, target_mrad)| target_mrad);
+        // Straight behind, noise must not change the sense of turning.
+        let is_behind = turn_mrad(HALF_TURN_MRAD, target_mrad).abs() < SAME_WAY_MRAD;
+        let turns_over = (target_mrad < 0) != (self.target_mrad < 0);
+        if !(is_behind && turns_over) {
+            self.target_mrad = target_mrad;
         }
-        if i32::from(self.target_mrad).abs() <= FACING_MRAD {
+        // Where the sonars ahead are dead the way cannot be seen, and those beside them have to do.
+        let ahead_mrad = ahead_mrad(scan);
+        let is_sure = seen.is_some() || ahead_mrad > FACING_MRAD;
+        if is_sure && i32::from(self.target_mrad).abs() <= ahead_mrad {
             self.enter(PilotState::Leave);
             return self.drive(scan, Beside::WAY_OUT, SILENT);
         }
         Suggestion { heading_mrad: self.target_mrad, speed_permille: 0 }
     }
 
-    fn leave<const SONARS: usize>(&mut self, scan: &Scan<'_, SONARS>, leaving: bool) -> Suggestion {
+    fn leave<const SONARS: usize>(&mut self, scan: &Scan<'_, SONARS>, closest: &Closest, leaving: bool) -> Suggestion {
         if self.is_out_of_patience() {
             return self.give_up(scan);
         }
         if !leaving {
             self.enter(PilotState::Follow);
-            return self.follow(scan, leaving);
+            return self.follow(scan, closest, leaving);
         }
         self.drive(scan, Beside::WAY_OUT, SILENT)
     }
+}
+
+/// How far aside the sonars look that tell what lies ahead: where all of those straight ahead are dead, the ones beside them.
+fn ahead_mrad<const SONARS: usize>(scan: &Scan<'_, SONARS>) -> i32 {
+    let looks_ahead = |bearing_mrad: i16| i32::from(bearing_mrad).abs() < FACING_MRAD;
+    let sees = scan.echoes().any(|(range_mm, bearing_mrad)| range_mm != DEAD && looks_ahead(bearing_mrad));
+    if sees { FACING_MRAD } else { BESIDE_DEAD_MRAD }
+}
+
+/// The nearest obstacle ahead.
+fn ahead<const SONARS: usize>(scan: &Scan<'_, SONARS>) -> Option<Obstacle> {
+    let within_mrad = ahead_mrad(scan);
+    scan.nearest(|bearing_mrad| i32::from(bearing_mrad).abs() < within_mrad)
 }
