@@ -1,0 +1,72 @@
+//! Robots whose sonars fail explore the simulated world: what they touch, what they find, and what they know of their turns.
+
+use toposlam::Turn;
+use toposlam::reference::SNAPSHOT_BYTES;
+use toposlam_host::exploration::Exploration;
+use toposlam_host::world::{Plan, Report, RobotModel, SonarModel};
+
+/// How an exploration went.
+struct Outcome {
+    report: Report,
+    /// Frames in which the robot touched a wall.
+    touched: u32,
+    /// Places of which the drive told rightly, wrongly, how the robot left them.
+    turns: (usize, usize),
+    /// The share of the places that the robot knows its map's vertex of.
+    located: f64,
+}
+
+/// Explores until so many places are found.
+fn explore(plan: &str, sonar: SonarModel, seed: u64, places: usize) -> Outcome {
+    let plan = Plan::built_in(plan).unwrap();
+    let mut buffer = [0; SNAPSHOT_BYTES];
+    let model = RobotModel { sonar, ..RobotModel::default() };
+    let mut exploration = Exploration::start(&plan, model, seed, &mut buffer).unwrap();
+    let (mut told, mut turns) = (None, (0, 0));
+    while exploration.places() < places {
+        assert!(exploration.frames() < 1000 * places as u64, "after {} places", exploration.places());
+        let found = exploration.advance().is_some();
+        if let ([.., Some(before), Some(_), Some(now)], true, Some(turn)) = (exploration.nodes(), found, told) {
+            let is_right = (turn == Turn::Back) == (before == now);
+            turns = (turns.0 + usize::from(is_right), turns.1 + usize::from(!is_right));
+        }
+        told = exploration.robot().drive().turn();
+    }
+    let report = exploration.journal().report();
+    Outcome { report, touched: exploration.rover().bumps(), turns, located: exploration.score().location }
+}
+
+#[test]
+fn a_robot_whose_sonar_ahead_is_dead_touches_no_wall_and_finds_its_places() {
+    for (plan, seed) in [("ring", 0), ("office", 1)] {
+        let sonar = SonarModel { dead_sonars: 1, ..SonarModel::default() };
+        let Outcome { report, touched, located, .. } = explore(plan, sonar, seed, 100);
+        assert_eq!(touched, 0, "{plan}");
+        assert!(report.missed + report.phantom + report.doubled <= 5, "{plan}: {report}");
+        assert!(located > 0.9, "{plan}: {located}");
+    }
+}
+
+#[test]
+fn a_robot_whose_sonar_at_the_side_is_dead_takes_no_corridor_for_a_place() {
+    let sonar = SonarModel { dead_sonars: 1 << 4, ..SonarModel::default() };
+    let Outcome { report, turns: (right, wrong), .. } = explore("ring", sonar, 0, 100);
+    assert!(report.phantom + report.doubled <= 1, "{report}");
+    assert!(right > 80 && wrong <= 3, "{right} right, {wrong} wrong");
+}
+
+#[test]
+fn a_robot_that_misses_a_tenth_of_the_echoes_knows_how_it_left_its_places() {
+    let sonar = SonarModel { missed_share: 0.1, ..SonarModel::default() };
+    let Outcome { report, turns: (right, wrong), located, .. } = explore("office", sonar, 0, 100);
+    assert!(right > 80 && wrong <= 3, "{right} right, {wrong} wrong");
+    assert!(report.missed + report.phantom + report.doubled <= 3, "{report}");
+    assert!(located > 0.9, "{located}");
+}
+
+#[test]
+fn walls_that_are_heard_from_along_them_make_no_places() {
+    let sonar = SonarModel { specular_limit_rad: 35_f64.to_radians(), ..SonarModel::default() };
+    let Outcome { report, .. } = explore("office", sonar, 0, 100);
+    assert!(report.phantom + report.doubled <= 1, "{report}");
+}
