@@ -104,7 +104,7 @@ fn the_real_laps_along_the_walls_repeat_one_place_and_give_no_cycle() {
         return;
     }
     let file = path.to_str().unwrap();
-    for filter in ["robust", "paper"] {
+    for (filter, knows_it_again) in [("robust", true), ("paper", false)] {
         let text = replayed(&[file, "--ring", "scitos-g5", "--lap-frames", "910", "--filter", filter]);
         let [frames, places] = numbers(&text, "5456 frames", "places")[..] else { panic!("{text}") };
         assert_eq!(frames, 5456);
@@ -113,12 +113,12 @@ fn the_real_laps_along_the_walls_repeat_one_place_and_give_no_cycle() {
             panic!("{text}")
         };
         assert!((20..50).contains(&on_graph) && (1..10).contains(&at_meet_point), "{text}");
-        // One spot is in nearly every lap, and little else is: README says so.
+        // One spot is in nearly every lap, and little else is; only the robust filter takes it for the same vertex: README says so.
         let repeats = |line: &&str| line.contains(" come again in lap ") && !line.trim().starts_with("0 of ");
         let repeated = text.lines().filter(repeats);
         assert!(repeated.count() >= 4, "{text}");
         let [_, again, expected, same] = numbers(&text, "in all", "same vertex")[..] else { panic!("{text}") };
-        assert!(again * 2 < expected && same * 2 < again, "{text}");
+        assert!(again * 2 < expected && (same * 2 > again) == knows_it_again, "{text}");
         assert!(text.contains("the map is no cycle"), "{text}");
     }
 }
