@@ -5,11 +5,12 @@
 //! corridor, whose front wall is then as close as the walls beside. The common range is the place's fingerprint.
 //!
 //! Each sensor is smoothed by the median of its last three readings, and two echoes among four are heard, so that a
-//! missed echo changes nothing; where a sensor is dead between two that hear about the same, it is taken to hear it too. The
-//! closest obstacle is the nearest range of the ring, the next the nearest at least `separation_mrad` away from it that is no
-//! part of the same wall, heard from along it, and so on. The *spread* is how much farther the third is than the first: it falls to the noise at the meet point and
-//! rises again behind it. A frame within `equidistance_mm` shows a meet point; enough of them confirm it; when they
-//! end, the place is reported once; the next is looked for after the spread has risen beyond `leave_mm`.
+//! missed echo changes nothing; where a sensor is dead between two that hear about the same, it is taken to hear it too.
+//! The closest obstacle is the nearest range of the ring, the next the nearest at least `separation_mrad` away from it
+//! that is no part of the same wall, heard from along it, and so on. The *spread* is how much farther the third is than
+//! the first: it falls to the noise at the meet point and rises again behind it. A frame within `equidistance_mm` shows
+//! a meet point; enough of them confirm it; when they end, the place is reported once; the next is looked for after the
+//! spread has risen beyond `leave_mm`.
 //!
 //! The radius is the mean, over the (at most eight) confirming frames with the smallest spread, of the mean range of
 //! the equidistant obstacles. While the robot comes nearer to the third obstacle it draws away from the first two, so
