@@ -1,7 +1,7 @@
 //! How far the ring turns from frame to frame, felt by where its obstacles are: the robot has no odometry.
 
 use crate::bearing::{turn_mrad, turned};
-use crate::place::scan::{Closest, OBSTACLES};
+use crate::place::scan::{Closest, OBSTACLES, insert_ascending};
 
 /// The ring turns by less in a frame, and an obstacle is known again within so much of where it is expected, in milliradians.
 const TURN_MAX_MRAD: i16 = 700;
@@ -38,12 +38,7 @@ impl Turning {
             let nearest_mrad = turns_mrad.min_by_key(|turn_mrad| turn_mrad.abs());
             let nearest_mrad = nearest_mrad.filter(|turn_mrad| turn_mrad.abs() < TURN_MAX_MRAD.into());
             if let Some(turn_mrad) = nearest_mrad {
-                let mut carried_mrad = turn_mrad as i16;
-                for slot in &mut more_mrad {
-                    if carried_mrad < *slot {
-                        core::mem::swap(slot, &mut carried_mrad);
-                    }
-                }
+                insert_ascending(&mut more_mrad, turn_mrad as i16);
                 known += 1;
             }
         }

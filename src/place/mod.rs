@@ -230,6 +230,9 @@ impl<const SONARS: usize> PlaceDetector<SONARS> {
         let ranges_mm = self.smooth_mm;
         let beside = |index: usize| Some((*ranges_mm.get(index)?, *self.geometry.bearings_mrad.get(index)?));
         for (index, range_mm) in self.smooth_mm.iter_mut().enumerate() {
+            if *range_mm != DEAD {
+                continue;
+            }
             let (before, after) = ((index + SONARS - 1) % SONARS, (index + 1) % SONARS);
             let (Some((before_mm, from_mrad)), Some((after_mm, to_mrad))) = (beside(before), beside(after)) else {
                 continue;
@@ -237,7 +240,7 @@ impl<const SONARS: usize> PlaceDetector<SONARS> {
             let is_gap_narrow = turn_mrad(from_mrad, to_mrad).abs() <= i32::from(self.config.separation_mrad);
             let hear_the_same =
                 is_echo(before_mm) && is_echo(after_mm) && before_mm.abs_diff(after_mm) <= self.config.equidistance_mm;
-            if *range_mm == DEAD && is_gap_narrow && hear_the_same {
+            if is_gap_narrow && hear_the_same {
                 *range_mm = before_mm / 2 + after_mm / 2;
             }
         }

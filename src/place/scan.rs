@@ -184,12 +184,7 @@ impl<const SONARS: usize> Scan<'_, SONARS> {
             let (count, sum_mrad) =
                 open.fold((0i32, 0i32), |(count, sum), within_mrad| (count + 1, sum.saturating_add(within_mrad)));
             if let Some(middle_mrad) = sum_mrad.checked_div(count) {
-                let mut carried_mrad = turned(from_mrad, middle_mrad);
-                for slot in &mut ways.bearings_mrad {
-                    if carried_mrad < *slot {
-                        core::mem::swap(slot, &mut carried_mrad);
-                    }
-                }
+                insert_ascending(&mut ways.bearings_mrad, turned(from_mrad, middle_mrad));
                 ways.len += 1;
             }
         }
@@ -222,6 +217,15 @@ impl Ways {
         let off_mrad = |way_mrad: i16| turn_mrad(bearing_mrad, way_mrad).abs();
         let nearest = self.bearings_mrad().iter().copied().enumerate().min_by_key(|&(_, way_mrad)| off_mrad(way_mrad));
         nearest.filter(|&(_, way_mrad)| off_mrad(way_mrad) <= within_mrad)
+    }
+}
+
+/// Inserts an angle in ascending order; the last one falls out.
+pub(crate) fn insert_ascending(angles_mrad: &mut [i16], mut angle_mrad: i16) {
+    for slot in angles_mrad {
+        if angle_mrad < *slot {
+            core::mem::swap(slot, &mut angle_mrad);
+        }
     }
 }
 
