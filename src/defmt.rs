@@ -6,7 +6,7 @@ use defmt::{Format, Formatter, write};
 
 use crate::place::{Place, PlaceConfigError};
 use crate::ring::Echo;
-use crate::sonar::{
+use crate::ring::drivers::{
     AddressError, BridgeError, HcSr04ConfigError, MaxBotixConfigError, SonarError, SonarFault, Srf08ConfigError,
 };
 use crate::{

@@ -119,61 +119,48 @@
 //!
 //! | Paper | File |
 //! |---|---|
-//! | Eq. 1, labels | `fingerprint.rs`, as running means `map.rs` |
-//! | Definitions 3 to 5, n-grams | `ngram/mod.rs`, `ngram/table.rs` |
-//! | Definition 6, Eq. 2 and 3, consistency | `consistency/` |
+//! | Eq. 1, labels | `place/fingerprint.rs`, as running means `map/` |
+//! | Definitions 3 to 5, n-grams | `filter/paper/ngram/` |
+//! | Definition 6, Eq. 2 and 3, consistency | `filter/paper/consistency/` |
 //! | Eq. 4 and 5, the filter's step | `filter/paper/selection.rs`, `filter/paper/resample.rs` |
 //! | Eq. 6, the weight | `filter/paper/particle.rs` |
-//! | Eq. 7 to 9, its factors | `likelihood.rs` |
+//! | Eq. 7 to 9, its factors | `filter/paper/likelihood.rs` |
 //! | Section III.B, localisation | `filter/mod.rs` ([`Update::vertex`]) |
 //! | Eq. 2, the half from history to map, with its n-gram | `filter/robust/worst.rs` |
 //! | Section IV.A, meet points | `place/` |
 #![cfg_attr(not(test), no_std)]
 #![forbid(unsafe_code)]
 
-mod bearing;
 #[cfg(feature = "snapshot")]
 mod checksum;
-mod consistency;
 #[cfg(feature = "defmt")]
 mod defmt;
 pub mod drive;
 mod fault;
 mod filter;
-mod fingerprint;
-mod history;
-mod likelihood;
 mod map;
 #[cfg(feature = "wire")]
 mod mapper;
-mod ngram;
-mod observation;
+#[cfg(feature = "snapshot")]
+pub mod persist;
 pub mod place;
 pub mod reference;
 pub mod ring;
 #[cfg(feature = "wire")]
 pub mod robot;
-#[cfg(feature = "snapshot")]
-pub mod snapshot;
-pub mod sonar;
-#[cfg(feature = "store")]
-pub mod store;
 #[cfg(feature = "wire")]
 pub mod wire;
 
-pub use consistency::{Consistency, Direction, Evidence};
 pub use fault::{FaultCounters, FaultKind};
 pub use filter::{
-    Config, ConfigError, Filter, FilterCapacities, PaperFilter, Particle, Prior, RobustConfig, RobustFilter, Update,
-    WeightFactors, WorstNgram,
+    Config, ConfigError, Consistency, Direction, Evidence, Filter, FilterCapacities, History, Ngram, NgramError,
+    NgramLength, NgramTable, NgramsFull, Observation, PaperFilter, Particle, Prior, RobustConfig, RobustFilter, Turn,
+    Update, WeightFactors, WorstNgram,
 };
-pub use fingerprint::{Fingerprint, FingerprintError};
-pub use history::History;
 pub use map::{Map, VerticesFull};
 #[cfg(feature = "wire")]
 pub use mapper::{Mapper, MapperConfig, MapperError};
-pub use ngram::{Ngram, NgramError, NgramLength, NgramTable, NgramsFull};
-pub use observation::{Observation, Turn};
+pub use place::{Fingerprint, FingerprintError};
 
 /// The code in the README is compiled as a test.
 #[cfg(all(doctest, feature = "wire"))]

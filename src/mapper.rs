@@ -1,8 +1,8 @@
 //! The whole way on the robot: ring frame → place → hypotheses → map update → wire.
 
+use crate::persist::snapshot::{FILTER_SECTION, Resume, Snapshot, SnapshotError, Writer};
 use crate::place::{Place, PlaceConfig, PlaceConfigError, PlaceDetector};
 use crate::ring::{RingFrame, RingGeometry};
-use crate::snapshot::{FILTER_SECTION, Resume, Snapshot, SnapshotError, Writer};
 use crate::wire::{Capacities, Hello, Message, QueueFull, Reporter, ResetCause};
 use crate::{ConfigError, FaultCounters, Filter, Map, Observation, RobustConfig, Turn, Update};
 use core::fmt;

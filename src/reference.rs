@@ -22,8 +22,8 @@ use crate::{
 use crate::{
     Mapper, MapperConfig,
     drive::DriveConfig,
+    persist::snapshot::SnapshotPolicy,
     robot::{self, Robot},
-    snapshot::SnapshotPolicy,
     wire::ResetCause,
 };
 

@@ -5,9 +5,9 @@ use std::sync::LazyLock;
 
 use arbitrary::Arbitrary;
 use libfuzzer_sys::fuzz_target;
+use toposlam::persist::snapshot::{FILTER_SECTION, Writer};
 use toposlam::place::PlaceDetector;
 use toposlam::reference::{PLACE, RING, SONARS};
-use toposlam::snapshot::{FILTER_SECTION, Writer};
 use toposlam::wire::{
     Chunk, Command, Decoder, Inbox, Info, Outcome, Progress, Refusal, Request, ResetCause, Setting, Settings, Staging,
     Version, crc32,

@@ -14,7 +14,7 @@ use libfuzzer_sys::fuzz_target;
 use toposlam::{
     FaultCounters, FaultKind,
     ring::RingFrame,
-    sonar::{
+    ring::drivers::{
         AddressError, BridgeError, FiringPlan, HcSr04Config, HcSr04Ring, MaxBotixConfig, MaxBotixRing, Microseconds,
         Sc18im700, SonarRing, Srf08Config, Srf08Ring, change_maxbotix_address, change_srf08_address,
     },

@@ -1,7 +1,7 @@
 //! A small robust filter, what a robot may see, and what holds of a filter whatever it saw.
 
 use arbitrary::Arbitrary;
-use toposlam::snapshot::{FILTER_SECTION, Reader, Snapshot, SnapshotError, Writer};
+use toposlam::persist::snapshot::{FILTER_SECTION, Reader, Snapshot, SnapshotError, Writer};
 use toposlam::{Fingerprint, Map, Observation, RobustConfig, RobustFilter, Turn, Update};
 
 /// The most hypotheses of a [`Small`] filter.

@@ -24,12 +24,12 @@ use static_cell::ConstStaticCell;
 use toposlam::{
     FaultCounters, Filter as _, Fingerprint, Observation, RobustConfig, RobustFilter, Turn, Update,
     drive::{Drive, Suggestion},
+    persist::snapshot::Writer,
     reference::{
         self, Detector, Filter, HISTORY, PaperReference, ReferenceRobot, RobotMapper, SNAPSHOT_BYTES, SONARS, VERTICES,
     },
     ring::{Echo, RingFrame},
     robot::{Board, KeepError},
-    snapshot::Writer,
     wire::{
         Capacities, Chunk, Command, Encoder, Hello, Inbox, MAX_FRAME_BYTES, Outcome, QueueFull, Reporter, Request,
         ResetCause,

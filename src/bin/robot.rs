@@ -30,10 +30,10 @@ use stm32f4xx_hal::{
 use toposlam::{
     FaultCounters, MapperConfig,
     drive::{DifferentialDrive, Suggestion, WheelsConfig},
+    persist::store::{BootPolicy, Store},
     reference::{MAPPER, ROBOT, ReferenceRobot, SNAPSHOT_BYTES, SONARS, STORE},
+    ring::drivers::{Sc18im700, SonarRing, Srf08Config, Srf08Ring},
     robot::{Board, KeepError, RobotConfig},
-    sonar::{Sc18im700, SonarRing, Srf08Config, Srf08Ring},
-    store::{BootPolicy, Store},
     wire::{QueueFull, ResetCause},
 };
 

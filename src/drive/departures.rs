@@ -3,7 +3,7 @@
 use super::pilot::WaysOut;
 use crate::Filter;
 #[cfg(feature = "snapshot")]
-use crate::snapshot::{Reader, SnapshotError, Writer};
+use crate::persist::snapshot::{Reader, SnapshotError, Writer};
 
 /// A place has at most so many ways; the seventh and eighth have no room in the note of a place.
 pub(super) const WAYS: usize = 7;

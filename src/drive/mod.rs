@@ -25,9 +25,9 @@ pub use navigator::{Goal, Journey};
 pub use pilot::PilotState;
 pub use wheels::{DifferentialDrive, MotorError, Wheel, WheelSpeeds, WheelsConfig, WheelsConfigError};
 
-use crate::place::{Place, PlaceDetector};
 #[cfg(feature = "snapshot")]
-use crate::snapshot::{Reader, Resume, SnapshotError, Writer};
+use crate::persist::snapshot::{Reader, Resume, SnapshotError, Writer};
+use crate::place::{Place, PlaceDetector};
 use crate::{FaultCounters, Filter, Turn, Update};
 use navigator::Navigator;
 use pilot::Pilot;

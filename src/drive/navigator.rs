@@ -6,7 +6,7 @@ use super::departures::{Departures, WAYS, Way};
 use super::pilot::WaysOut;
 use crate::filter::draws;
 #[cfg(feature = "snapshot")]
-use crate::snapshot::{Reader, SnapshotError, Writer};
+use crate::persist::snapshot::{Reader, SnapshotError, Writer};
 use crate::{Filter, Update};
 
 /// A robot is at a vertex when the filter believes so with at least this probability, in units of 2⁻¹⁶.

@@ -3,7 +3,7 @@
 use super::steering::{Beside, along_edge, meet_point};
 use super::turning::Turning;
 use super::{DriveConfig, DriveConfigError, Suggestion};
-use crate::bearing::{HALF_TURN_MRAD, turn_mrad, turned};
+use crate::place::bearing::{HALF_TURN_MRAD, turn_mrad, turned};
 use crate::place::scan::{Closest, DEAD, Obstacle, SILENT, Scan, Ways};
 use crate::{FaultCounters, FaultKind, Turn};
 

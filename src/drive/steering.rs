@@ -4,7 +4,7 @@
 //! the directions to them (Choset and Nagatani, the paper's section IV.A). With unit vectors u, v to obstacles at ranges r, s,
 //! the difference r − s changes by −(u − v) · δ when the robot moves by δ.
 
-use crate::bearing::{UNIT, Vector, unit};
+use crate::place::bearing::{UNIT, Vector, unit};
 use crate::place::scan::{Closest, Obstacle, Scan};
 
 /// In which bearings the obstacle beside the robot is looked for, counter-clockwise from the heading, on the left; mirrored on

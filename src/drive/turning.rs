@@ -1,6 +1,6 @@
 //! How far the ring turns from frame to frame, felt by where its obstacles are: the robot has no odometry.
 
-use crate::bearing::{turn_mrad, turned};
+use crate::place::bearing::{turn_mrad, turned};
 use crate::place::scan::{Closest, OBSTACLES, insert_ascending};
 
 /// The ring turns by less in a frame, and an obstacle is known again within so much of where it is expected, in milliradians.

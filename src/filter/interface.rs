@@ -3,7 +3,7 @@
 use super::robust::NGRAM_LENGTH;
 use super::{ConfigError, PaperFilter, RobustConfig, RobustFilter, Update, WorstNgram};
 #[cfg(feature = "snapshot")]
-use crate::snapshot::{Reader, SnapshotError, Writer};
+use crate::persist::snapshot::{Reader, SnapshotError, Writer};
 use crate::{Config, FaultCounters, Map, Observation};
 
 /// What a filter with some settings has room for.

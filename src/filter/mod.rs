@@ -1,11 +1,16 @@
 //! Topological SLAM from a sequence of places: the filters, and what an observation tells of their best map.
 
 mod interface;
+mod observation;
 mod paper;
 mod robust;
 
 pub use interface::{Filter, FilterCapacities};
-pub use paper::{Config, PaperFilter, Particle, Prior};
+pub use observation::{Observation, Turn};
+pub use paper::{
+    Config, Consistency, Direction, Evidence, History, Ngram, NgramError, NgramLength, NgramTable, NgramsFull,
+    PaperFilter, Particle, Prior,
+};
 pub use robust::{RobustConfig, RobustFilter};
 
 use core::fmt;

@@ -33,14 +33,17 @@
 //! # Ok::<(), toposlam::place::PlaceConfigError>(())
 //! ```
 
+pub(crate) mod bearing;
 mod config;
+mod fingerprint;
 pub(crate) mod scan;
 
 pub use config::{PlaceConfig, PlaceConfigError};
+pub use fingerprint::{Fingerprint, FingerprintError};
 
-use crate::bearing::turn_mrad;
 use crate::ring::{Echo, RingFrame, RingGeometry};
-use crate::{FaultCounters, FaultKind, Fingerprint};
+use crate::{FaultCounters, FaultKind};
+use bearing::turn_mrad;
 use scan::{DEAD, Meeting, SILENT, Scan, is_echo};
 
 /// How many frames the radius is averaged over.

@@ -1,6 +1,6 @@
 //! One ring of smoothed ranges, and the closest obstacles in it, in separate bearings.
 
-use crate::bearing::{HALF_TURN_MRAD, turn_mrad, turned};
+use crate::place::bearing::{HALF_TURN_MRAD, turn_mrad, turned};
 use crate::ring::RingGeometry;
 
 /// Smoothed range of a sensor that said nothing about the world.

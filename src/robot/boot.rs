@@ -3,7 +3,7 @@
 use embedded_storage::nor_flash::NorFlash;
 
 use super::{Robot, RobotConfig, RobotError};
-use crate::store::{BootPolicy, BootReport, Store, resume};
+use crate::persist::store::{BootPolicy, BootReport, Store, resume};
 use crate::wire::Staging;
 
 impl<'buffer, const SONARS: usize, const N: usize, const V: usize, const HISTORY: usize>

@@ -3,7 +3,7 @@
 use super::{Board, Line, RECEIVED_PER_TURN, Robot, restore, snapshot};
 use crate::FaultKind;
 use crate::drive::{self, Goal};
-use crate::snapshot::Resume;
+use crate::persist::snapshot::Resume;
 use crate::wire::{Command, Info, Journey, JourneyState, Message, Outcome, Refusal, Setting, Settings, Version};
 
 /// No way to a vertex was told of.

@@ -3,7 +3,7 @@
 use core::fmt;
 
 use crate::drive::{DriveConfig, DriveConfigError};
-use crate::snapshot::SnapshotPolicy;
+use crate::persist::snapshot::SnapshotPolicy;
 use crate::{MapperConfig, MapperError, RobustConfig};
 
 /// The settings of every stage.

@@ -57,9 +57,9 @@ pub use board::{Board, KeepError};
 pub use config::{RobotConfig, RobotError};
 
 use crate::drive::{Drive, Goal, Journey, Suggestion};
+use crate::persist::snapshot::{DRIVE_SECTION, Resume, Snapshot, SnapshotError, SnapshotPolicy, Writer};
 use crate::place::Place;
 use crate::ring::RingFrame;
-use crate::snapshot::{DRIVE_SECTION, Resume, Snapshot, SnapshotError, SnapshotPolicy, Writer};
 use crate::wire::{self, Echoes, Encoder, Health, Inbox, MAX_FRAME_BYTES, Message, QueueFull, Staging};
 use crate::{FaultCounters, FaultKind, Mapper, RobustFilter, Update};
 

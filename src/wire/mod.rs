@@ -28,39 +28,20 @@
 //! # Ok::<(), toposlam::wire::EncodeError>(())
 //! ```
 
-mod belief;
-mod code;
-mod command;
 mod decoder;
 mod digest;
-mod drive;
-mod echoes;
 mod frame;
-mod inbox;
-mod list;
-mod message;
-mod payload;
-mod picture;
-mod reply;
-mod reporter;
-mod setting;
-mod staging;
+mod listener;
+mod messages;
+mod robot;
 
-pub use belief::{Belief, PlaceProbability, Renamed, Worst};
-pub use command::{CHUNK_BYTES, Chunk, Command, Request};
 pub use decoder::{Arrival, DecodeError, Decoder, DecoderCounters, Header, Progress};
 pub use digest::{crc32, map_digest};
-pub use drive::{Drive, Journey, JourneyState};
-pub use echoes::Echoes;
 pub use frame::{EncodeError, Encoder, FRAME_VERSION, MAX_FRAME_BYTES};
-pub use inbox::Inbox;
-pub use list::List;
-pub use message::{
-    Capacities, Evidence, Health, Hello, HelloError, Location, Message, PROTOCOL_VERSION, ResetCause, Row, SCHEMA_HASH,
+pub use listener::Picture;
+pub use messages::{
+    Belief, CHUNK_BYTES, Capacities, Chunk, Command, Drive, Echoes, Evidence, Health, Hello, HelloError, Info, Journey,
+    JourneyState, List, Location, Message, Outcome, PROTOCOL_VERSION, Payload, PlaceProbability, Refusal, Renamed,
+    Reply, Request, ResetCause, Row, SCHEMA_HASH, Setting, Settings, Version, Worst,
 };
-pub use payload::Payload;
-pub use picture::Picture;
-pub use reply::{Info, Outcome, Refusal, Reply, Version};
-pub use reporter::{QueueFull, Reporter};
-pub use setting::{Setting, Settings};
-pub use staging::Staging;
+pub use robot::{Inbox, QueueFull, Reporter, Staging};

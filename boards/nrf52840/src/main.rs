@@ -31,10 +31,10 @@ use static_cell::ConstStaticCell;
 use toposlam::{
     FaultCounters, MapperConfig,
     drive::{DifferentialDrive, Suggestion, WheelsConfig},
+    persist::store::{BootPolicy, Store},
     reference::{MAPPER, ROBOT, ReferenceRobot, SNAPSHOT_BYTES, SONARS},
+    ring::drivers::{SonarRing, Srf08Config, Srf08Ring},
     robot::{Board, KeepError, RobotConfig},
-    sonar::{SonarRing, Srf08Config, Srf08Ring},
-    store::{BootPolicy, Store},
     wire::{QueueFull, ResetCause},
 };
 

@@ -1,7 +1,7 @@
 //! A filter that maps nothing and notes what it is told.
 
+use toposlam::persist::snapshot::{Reader, SnapshotError, Writer};
 use toposlam::reference::VERTICES;
-use toposlam::snapshot::{Reader, SnapshotError, Writer};
 use toposlam::{
     ConfigError, FaultCounters, Filter, FilterCapacities, Map, Observation, Update, WeightFactors, WorstNgram,
 };

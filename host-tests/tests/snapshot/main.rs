@@ -9,7 +9,7 @@ mod specification;
 
 use common::environments::{easy, floor, six_rooms};
 use common::robot::{Hints, Robot};
-use toposlam::snapshot::{FILTER_SECTION, Reader, Snapshot, SnapshotError, Writer};
+use toposlam::persist::snapshot::{FILTER_SECTION, Reader, Snapshot, SnapshotError, Writer};
 use toposlam::{Fingerprint, Map, Observation, RobustConfig, RobustFilter, Update};
 
 /// A drive: settings of a filter, and what becomes of it.

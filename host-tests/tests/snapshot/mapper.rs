@@ -1,7 +1,7 @@
 //! A mapper in a snapshot: with other sections, and with the next place where it should be.
 
+use toposlam::persist::snapshot::{Resume, Snapshot, SnapshotError, Writer};
 use toposlam::reference::{self, PaperReference, SONARS, VERTICES};
-use toposlam::snapshot::{Resume, Snapshot, SnapshotError, Writer};
 use toposlam::wire::{ResetCause, map_digest};
 use toposlam::{FaultCounters, Filter, Mapper, MapperConfig};
 use toposlam_host::world::{Plan, RobotModel, Simulation};

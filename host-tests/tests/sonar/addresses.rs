@@ -4,7 +4,7 @@ use embedded_hal::i2c::{ErrorKind, NoAcknowledgeSource};
 use embedded_hal_mock::eh1::i2c::{Mock as I2cMock, Transaction};
 use toposlam::{
     FaultCounters,
-    sonar::{
+    ring::drivers::{
         AddressError, MaxBotixConfig, MaxBotixRing, SonarRing, Srf08Config, Srf08Ring, change_maxbotix_address,
         change_srf08_address,
     },

@@ -7,8 +7,10 @@ use embedded_hal::{
 use proptest::prelude::*;
 use toposlam::{
     FaultCounters, FaultKind,
+    ring::drivers::{
+        HcSr04Config, HcSr04Ring, MaxBotixConfig, MaxBotixRing, Microseconds, SonarRing, Srf08Config, Srf08Ring,
+    },
     ring::{Echo, RingFrame},
-    sonar::{HcSr04Config, HcSr04Ring, MaxBotixConfig, MaxBotixRing, Microseconds, SonarRing, Srf08Config, Srf08Ring},
 };
 use toposlam_host::chip::{HcSr04Bank, HcSr04Fault, I2cBus, MaxBotixBank, SensorFault, SimulatedTime, Srf08Bank};
 

@@ -2,7 +2,7 @@
 
 use embedded_hal::i2c::I2c;
 use embedded_hal_nb::{nb, serial};
-use toposlam::sonar::{BridgeError, Sc18im700};
+use toposlam::ring::drivers::{BridgeError, Sc18im700};
 use toposlam_host::chip;
 
 use crate::link::{Link, NoError};

@@ -2,8 +2,10 @@
 
 use toposlam::{
     FaultCounters,
+    ring::drivers::{
+        FiringPlan, HcSr04Config, HcSr04Ring, MaxBotixConfig, MaxBotixRing, SonarRing, Srf08Config, Srf08Ring,
+    },
     ring::{Echo, RingFrame},
-    sonar::{FiringPlan, HcSr04Config, HcSr04Ring, MaxBotixConfig, MaxBotixRing, SonarRing, Srf08Config, Srf08Ring},
 };
 use toposlam_host::chip::{HcSr04Bank, I2cBus, MaxBotixBank, SimulatedTime, Srf08Bank};
 

@@ -8,8 +8,8 @@ use embedded_hal_mock::eh1::{
 };
 use toposlam::{
     FaultCounters,
+    ring::drivers::{FiringPlan, HcSr04Config, HcSr04Ring, Microseconds, SonarError, SonarFault, SonarRing},
     ring::{Echo, RingFrame},
-    sonar::{FiringPlan, HcSr04Config, HcSr04Ring, Microseconds, SonarError, SonarFault, SonarRing},
 };
 use toposlam_host::chip::{EchoPin, HcSr04Bank, HcSr04Fault, SimulatedTime, TriggerPin};
 

@@ -13,8 +13,8 @@ mod srf10;
 use embedded_hal::delay::DelayNs;
 use toposlam::{
     FaultCounters, FaultKind,
+    ring::drivers::SonarFault,
     ring::{Echo, RingFrame},
-    sonar::SonarFault,
 };
 
 /// Counts the time that the driver waits.

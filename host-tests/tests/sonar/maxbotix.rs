@@ -7,8 +7,8 @@ use embedded_hal_mock::eh1::{
 };
 use toposlam::{
     FaultCounters,
+    ring::drivers::{FiringPlan, MaxBotixConfig, MaxBotixRing, SonarError, SonarFault, SonarRing},
     ring::{Echo, RingFrame},
-    sonar::{FiringPlan, MaxBotixConfig, MaxBotixRing, SonarError, SonarFault, SonarRing},
 };
 use toposlam_host::chip::{I2cBus, MaxBotixBank, SensorFault, SimulatedTime};
 

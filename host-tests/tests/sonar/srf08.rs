@@ -4,8 +4,8 @@ use embedded_hal::i2c::{ErrorKind, NoAcknowledgeSource};
 use embedded_hal_mock::eh1::i2c::{Mock as I2cMock, Transaction};
 use toposlam::{
     FaultCounters, FaultKind,
+    ring::drivers::{FiringPlan, Sc18im700, SonarError, SonarFault, SonarRing, Srf08Config, Srf08Ring},
     ring::{Echo, RingFrame},
-    sonar::{FiringPlan, Sc18im700, SonarError, SonarFault, SonarRing, Srf08Config, Srf08Ring},
 };
 use toposlam_host::chip::{self, SensorFault, Srf08Bank};
 

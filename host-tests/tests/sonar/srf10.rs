@@ -5,7 +5,7 @@ use embedded_hal_mock::eh1::i2c::{Mock as I2cMock, Transaction};
 use toposlam::{
     FaultCounters,
     ring::Echo,
-    sonar::{FiringPlan, SonarError, SonarFault, SonarRing, Srf08Config, Srf08Ring},
+    ring::drivers::{FiringPlan, SonarError, SonarFault, SonarRing, Srf08Config, Srf08Ring},
 };
 use toposlam_host::chip::{I2cBus, SensorFault, Srf08Bank};
 

@@ -2,8 +2,8 @@
 
 use super::*;
 use toposlam::MapperConfig;
-use toposlam::snapshot::SnapshotError;
-use toposlam::store::{BootOutcome, BootPolicy, BootReport, StoreError, resume};
+use toposlam::persist::snapshot::SnapshotError;
+use toposlam::persist::store::{BootOutcome, BootPolicy, BootReport, StoreError, resume};
 use toposlam::wire::Message;
 use toposlam::{FaultCounters, Filter};
 use toposlam_host::chip::{Cut, Tear};

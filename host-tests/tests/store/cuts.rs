@@ -2,7 +2,7 @@
 
 use super::*;
 use rayon::prelude::*;
-use toposlam::store::StoreError;
+use toposlam::persist::store::StoreError;
 use toposlam_host::chip::{Cut, Tear};
 
 /// What a drive with cuts in it came to.

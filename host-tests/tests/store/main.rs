@@ -8,8 +8,8 @@ mod wear;
 
 use common::environments::floor;
 use common::robot::{Hints, Robot};
-use toposlam::snapshot::{FILTER_SECTION, Snapshot, Writer};
-use toposlam::store::Store;
+use toposlam::persist::snapshot::{FILTER_SECTION, Snapshot, Writer};
+use toposlam::persist::store::Store;
 use toposlam::wire::map_digest;
 use toposlam::{RobustConfig, reference};
 use toposlam_host::chip::FlashModel;

@@ -1,7 +1,7 @@
 //! How long the flash lasts, and what becomes of a store that is not as it was left.
 
 use super::*;
-use toposlam::store::StoreError;
+use toposlam::persist::store::StoreError;
 use toposlam_host::chip::FlashFault;
 
 /// Stores so many times; tells the erases of each sector.

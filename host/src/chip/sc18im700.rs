@@ -1,6 +1,6 @@
 //! A model of the SC18IM700 UART-to-I2C bridge: a byte in, bytes out.
 //!
-//! It follows the data sheet's message format (see the driver in `toposlam::sonar`), not any driver: messages may be cut
+//! It follows the data sheet's message format (see the driver in `toposlam::ring::drivers`), not any driver: messages may be cut
 //! anywhere, registers hold what was written to them, unknown commands are ignored as the chip does.
 
 use std::mem;

@@ -3,7 +3,7 @@
 use std::{cell::Cell, rc::Rc};
 
 use embedded_hal::delay::DelayNs;
-use toposlam::sonar::Microseconds;
+use toposlam::ring::drivers::Microseconds;
 
 /// Simulated time, shared by its clones: the drivers wait with it and read it, the models act by it.
 #[derive(Clone, Debug)]

@@ -11,10 +11,10 @@ use std::{
 
 use anyhow::{Context, bail, ensure};
 use toposlam::drive::Suggestion;
+use toposlam::persist::snapshot::Resume;
 use toposlam::place::Place;
 use toposlam::reference::{SNAPSHOT_BYTES, SONARS};
 use toposlam::ring::RingFrame;
-use toposlam::snapshot::Resume;
 use toposlam::wire::{Command, Encoder, MAX_FRAME_BYTES, Message, Outcome, Reply, Request};
 use toposlam::{FaultCounters, FaultKind, Fingerprint};
 use toposlam_host::emulator::Emulation;

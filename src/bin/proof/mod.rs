@@ -13,10 +13,10 @@ use toposlam::{
     Config, ConfigError, Consistency, Direction, FaultCounters, FaultKind, Fingerprint, FingerprintError, History, Map,
     MapperError, Ngram, NgramError, NgramLength, NgramTable, NgramsFull, Observation, PaperFilter, Prior, RobustConfig,
     RobustFilter, Turn, VerticesFull,
+    persist::snapshot::{FILTER_SECTION, Resume, Snapshot, SnapshotError, SnapshotPolicy, Writer},
     place::{PlaceConfig, PlaceConfigError, PlaceDetector},
     reference,
     ring::{Echo, RingFrame, RingGeometry},
-    snapshot::{FILTER_SECTION, Resume, Snapshot, SnapshotError, SnapshotPolicy, Writer},
     wire::{
         Decoder, EncodeError, Encoder, Hello, HelloError, Inbox, JourneyState, MAX_FRAME_BYTES, Message, Outcome,
         Payload, Picture, Progress, QueueFull, Refusal, Reply, Reporter, Request, ResetCause, Setting, Settings,

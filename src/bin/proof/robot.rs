@@ -10,9 +10,9 @@ use toposlam::drive::{
     DifferentialDrive, Drive, DriveConfig, DriveConfigError, Goal, MotorError, Suggestion, WheelSpeeds, WheelsConfig,
     WheelsConfigError,
 };
+use toposlam::persist::snapshot::{Resume, SnapshotError};
 use toposlam::reference::{self, HISTORY, ReferenceRobot, SNAPSHOT_BYTES, VERTICES};
 use toposlam::robot::{Board, KeepError, RobotError};
-use toposlam::snapshot::{Resume, SnapshotError};
 use toposlam::wire::QueueFull;
 
 use super::{Opaque, any_frame, show};

@@ -12,7 +12,7 @@ use static_cell::ConstStaticCell;
 use toposlam::{
     FaultCounters,
     ring::RingFrame,
-    sonar::{
+    ring::drivers::{
         AddressError, BridgeError, FiringPlan, HcSr04Config, HcSr04ConfigError, HcSr04Ring, MaxBotixConfig,
         MaxBotixConfigError, MaxBotixRing, Microseconds, Sc18im700, SonarError, SonarRing, Srf08Config,
         Srf08ConfigError, Srf08Ring, change_maxbotix_address, change_srf08_address,

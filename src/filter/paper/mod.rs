@@ -1,6 +1,10 @@
 //! The paper's particle filter: topological SLAM from a sequence of fingerprints (Section III).
 
 mod config;
+mod consistency;
+mod history;
+mod likelihood;
+mod ngram;
 mod particle;
 mod particles;
 mod prior;
@@ -8,11 +12,14 @@ mod resample;
 mod selection;
 
 pub use config::Config;
+pub use consistency::{Consistency, Direction, Evidence};
+pub use history::History;
+pub use ngram::{Ngram, NgramError, NgramLength, NgramTable, NgramsFull};
 pub use particle::Particle;
 pub use prior::Prior;
 
 use super::{ConfigError, Update, draws};
-use crate::{Consistency, FaultCounters, FaultKind, Fingerprint, History, Map, NgramLength};
+use crate::{FaultCounters, FaultKind, Fingerprint, Map};
 use particles::{Particles, Step};
 use rand_core::Rng;
 

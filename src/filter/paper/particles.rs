@@ -3,8 +3,8 @@
 use super::particle::{Particle, predict};
 use super::resample::PROPOSAL_REACH;
 use super::selection::{Candidate, Choice, Selection};
-use crate::consistency::{Consistency, Direction, Evidence};
-use crate::likelihood::Likelihood;
+use crate::filter::paper::consistency::{Consistency, Direction, Evidence};
+use crate::filter::paper::likelihood::Likelihood;
 use crate::{Config, Fingerprint, Map, NgramLength};
 
 /// What a step tells besides the particles.

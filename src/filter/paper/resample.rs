@@ -4,7 +4,7 @@
 //! is dear: what is accepted is drawn in proportion to the weight of Eq. 6, and Eq. 8 is computed for what is proposed
 //! only.
 
-use crate::likelihood::NAT;
+use crate::filter::paper::likelihood::NAT;
 
 /// A prediction whose Eq. 7 · Eq. 9 is this many nats below the best one is never proposed: e⁻¹⁵ · 2²⁰ rounds to 0. A label
 /// that is 3.9 σ_l off is out of the question then, however well the map would fit the evidence.

@@ -2,9 +2,9 @@
 
 use super::particle::{Particle, predict};
 use super::resample::{DISTANCE_REACH, PROPOSAL_REACH, PROPOSALS, accepts, draw_weight, target};
-use crate::consistency::{Consistency, Direction, Evidence};
 use crate::filter::WeightFactors;
-use crate::likelihood::Likelihood;
+use crate::filter::paper::consistency::{Consistency, Direction, Evidence};
+use crate::filter::paper::likelihood::Likelihood;
 use crate::{Fingerprint, Map, NgramLength};
 
 /// A prediction: that the robot of a particle went to a vertex, a new one behind the last of its map. In the order of the

@@ -3,7 +3,7 @@
 use super::super::hypothesis::{Hypothesis, NOWHERE};
 use super::super::tally::Tally;
 use super::parts::{bounded, check_symmetry, read_path, read_row, save_path, save_row};
-use crate::snapshot::{Reader, SnapshotError, Writer};
+use crate::persist::snapshot::{Reader, SnapshotError, Writer};
 
 /// Vertices, the place before the record, whether anything left it, and three floats.
 pub(super) const FIXED_BYTES: usize = 3 + 3 * 4;

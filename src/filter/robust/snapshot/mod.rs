@@ -8,7 +8,7 @@ mod parts;
 
 use super::{RobustConfig, RobustFilter, worst};
 use crate::FaultCounters;
-use crate::snapshot::{FRAME_BYTES, Reader, SnapshotError, Writer};
+use crate::persist::snapshot::{FRAME_BYTES, Reader, SnapshotError, Writer};
 use parts::{TALLY_BYTES, path_bytes, row_bytes};
 
 /// What the contents of the filter's section begin with.

@@ -5,7 +5,7 @@ use super::super::hypothesis::NOWHERE;
 use super::super::record::{Entry, Record};
 use super::super::tally::{FADE_VISITS, Tally};
 use crate::map::bits;
-use crate::snapshot::{Reader, SnapshotError, Writer};
+use crate::persist::snapshot::{Reader, SnapshotError, Writer};
 use crate::{Fingerprint, Map};
 
 /// Two floats, two counts, seven degrees.

@@ -1,7 +1,7 @@
 //! The robot's one buffer for snapshots that cross the line, either way.
 
-use super::digest::crc32;
-use super::{Chunk, Outcome, Refusal};
+use crate::wire::digest::crc32;
+use crate::wire::{Chunk, Outcome, Refusal};
 
 /// A snapshot on its way out, or on its way in, in a buffer of the caller's. One drops the other.
 ///

@@ -7,7 +7,7 @@
 //!
 //! ```
 //! # use embedded_storage::nor_flash::NorFlash;
-//! use toposlam::store::{Store, StoreError};
+//! use toposlam::persist::store::{Store, StoreError};
 //!
 //! fn keep<FLASH: NorFlash>(flash: FLASH, snapshot: &[u8], buffer: &mut [u8]) -> Result<(), StoreError> {
 //!     // The last 256 KiB of 1 MiB.

@@ -3,8 +3,8 @@
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 
-use super::frame::FRAME_VERSION;
 use super::{Message, Request};
+use crate::wire::FRAME_VERSION;
 
 /// What a frame can hold: [`Message`] and [`Request`], and nothing else.
 pub trait Payload: Serialize + DeserializeOwned + sealed::Sealed {

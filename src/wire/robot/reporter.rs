@@ -2,8 +2,8 @@
 
 use core::fmt;
 
-use super::digest::{map_digest, row_of};
-use super::{Belief, Capacities, Evidence, Hello, List, Location, Message, Renamed, ResetCause, Row, Worst};
+use crate::wire::digest::{map_digest, row_of};
+use crate::wire::{Belief, Capacities, Evidence, Hello, List, Location, Message, Renamed, ResetCause, Row, Worst};
 use crate::{FaultCounters, FaultKind, Filter, Map, Update};
 
 /// Decides what to send. It keeps what the listener was last told and hands each message to a callback, which says
@@ -338,7 +338,7 @@ impl<const V: usize> Default for Reporter<V> {
 }
 
 /// The bit of a vertex in a row; no bit from 64 on, so that `bit(v).wrapping_sub(1)` is every bit below `v`.
-pub(super) fn bit(vertex: u8) -> u64 {
+pub(in crate::wire) fn bit(vertex: u8) -> u64 {
     1u64.checked_shl(u32::from(vertex)).unwrap_or(0)
 }
 

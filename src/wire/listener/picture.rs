@@ -1,11 +1,11 @@
 //! The listener's side: the map as heard.
 
-use super::decoder::{Arrival, Header};
-use super::digest::rows_digest;
-use super::reporter::bit;
-use super::{Belief, Evidence, Health, Hello, Journey, Location, Message, Renamed, Row, Worst};
 use crate::FaultKind;
 use crate::map::bits;
+use crate::wire::decoder::{Arrival, Header};
+use crate::wire::digest::rows_digest;
+use crate::wire::robot::bit;
+use crate::wire::{Belief, Evidence, Health, Hello, Journey, Location, Message, Renamed, Row, Worst};
 
 /// The map as heard so far, and whether it is the robot's.
 ///

@@ -4,9 +4,9 @@
 use serde::{Deserialize, Serialize};
 
 use super::List;
-use super::reporter::bit;
 use crate::Filter;
 use crate::map::bits;
+use crate::wire::robot::bit;
 
 /// Where the robot may be, and how far the map itself is to be trusted.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -45,7 +45,7 @@ impl Belief {
     }
 
     /// The same belief under new numbers: a vertex that is gone is left out, and those that are one now are added up.
-    pub(super) fn rename(&mut self, renamed: &Renamed) {
+    pub(in crate::wire) fn rename(&mut self, renamed: &Renamed) {
         let mut places = [PlaceProbability::default(); 8];
         let mut count = 0;
         for &PlaceProbability { vertex, permille } in self.places.as_slice() {
@@ -75,7 +75,7 @@ pub struct Renamed {
 }
 
 impl Renamed {
-    pub(super) const GONE: u8 = u8::MAX;
+    pub(in crate::wire) const GONE: u8 = u8::MAX;
 
     /// What the last update of a filter did to the numbers of the first so many vertices; `None` when all kept theirs.
     pub fn of<const V: usize>(filter: &impl Filter<V>, vertices: u8, place_index: u32) -> Option<Self> {
@@ -95,7 +95,7 @@ impl Renamed {
 
     /// Renumbers the vertices of a map, labels and rows; `labelled` are the vertices whose label is known, before and now.
     /// Of vertices that are one now, the first one's label stays, and the edges of all; a vertex beyond `V` is left out.
-    pub(super) fn apply<const V: usize>(
+    pub(in crate::wire) fn apply<const V: usize>(
         &self,
         labels: &mut [(u16, u32); V],
         neighbours: &mut [u64; V],
@@ -122,7 +122,7 @@ impl Renamed {
     }
 
     /// How many vertices there are now, if there were so many before and none was added.
-    pub(super) fn vertices(&self, before: u8) -> u8 {
+    pub(in crate::wire) fn vertices(&self, before: u8) -> u8 {
         (0..before).filter_map(|vertex| self.now(vertex)).map(|now| now.saturating_add(1)).max().unwrap_or(0)
     }
 }
@@ -149,7 +149,7 @@ impl Worst {
     }
 
     /// The same under new numbers; `None` when a vertex of the walk is gone.
-    pub(super) fn renamed(self, renamed: &Renamed) -> Option<Self> {
+    pub(in crate::wire) fn renamed(self, renamed: &Renamed) -> Option<Self> {
         let walk = self.vertices.as_slice();
         let vertices = List::new(walk.iter().filter_map(|&vertex| renamed.now(vertex)));
         (vertices.as_slice().len() == walk.len()).then_some(Self { vertices, ..self })

@@ -29,7 +29,7 @@ pub struct Journey {
 
 impl Journey {
     /// The same under new numbers; `None` when the vertex is gone.
-    pub(super) fn renamed(self, renamed: &Renamed) -> Option<Self> {
+    pub(in crate::wire) fn renamed(self, renamed: &Renamed) -> Option<Self> {
         Some(Self { vertex: renamed.now(self.vertex)?, ..self })
     }
 }

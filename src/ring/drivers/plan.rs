@@ -6,7 +6,7 @@
 /// groups. A frame takes as long as one ranging for each group. 1 byte for each sensor.
 ///
 /// ```
-/// use toposlam::sonar::FiringPlan;
+/// use toposlam::ring::drivers::FiringPlan;
 ///
 /// assert_eq!(FiringPlan::<6>::interleaved(3).group_of, [0, 1, 2, 0, 1, 2]);
 /// // Two sensors that look to the same side, at each end of a half ring: any table will do.

@@ -3,7 +3,7 @@
 use embedded_storage::nor_flash::NorFlash;
 
 use super::{Kept, Store, StoreError};
-use crate::snapshot::{Resume, SnapshotError};
+use crate::persist::snapshot::{Resume, SnapshotError};
 
 /// What a robot does with the newest snapshot when it starts.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]

@@ -9,7 +9,7 @@
 //! know is skipped. Each stage writes and reads its own section; the filter's takes all the room that is left, so it comes last.
 //!
 //! ```
-//! use toposlam::snapshot::{Snapshot, Writer};
+//! use toposlam::persist::snapshot::{Snapshot, Writer};
 //!
 //! const ODOMETER: u8 = 200;
 //! let mut buffer = [0; 64];
@@ -21,7 +21,7 @@
 //! let mut section = snapshot.section(ODOMETER).unwrap();
 //! assert_eq!(section.u32()?, 1234);
 //! section.finish()?;
-//! # Ok::<(), toposlam::snapshot::SnapshotError>(())
+//! # Ok::<(), toposlam::persist::snapshot::SnapshotError>(())
 //! ```
 
 mod reader;

@@ -37,7 +37,7 @@ pub enum Message {
         vertices: u8,
         /// The number of edges, self-loops included.
         edges: u16,
-        /// CRC-32 of the map's canonical bytes, see [`map_digest`](super::map_digest).
+        /// CRC-32 of the map's canonical bytes, see [`map_digest`](crate::wire::map_digest).
         digest: u32,
     },
     /// The label of a vertex is now this.
@@ -189,7 +189,7 @@ pub struct Location {
 
 impl Location {
     /// The same place under new numbers; `None` when its vertex is gone.
-    pub(super) fn renamed(self, renamed: &Renamed) -> Option<Self> {
+    pub(in crate::wire) fn renamed(self, renamed: &Renamed) -> Option<Self> {
         Some(Self { vertex: renamed.now(self.vertex)?, ..self })
     }
 }

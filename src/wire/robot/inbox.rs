@@ -1,7 +1,7 @@
 //! The robot's end of the line: bytes in, at most one command in each turn of the main loop.
 
-use super::decoder::Progress;
-use super::{Command, Decoder, Outcome, Reply, Request};
+use crate::wire::decoder::Progress;
+use crate::wire::{Command, Decoder, Outcome, Reply, Request};
 use crate::{FaultCounters, FaultKind};
 
 /// Takes whatever comes on the robot's receive line, and hands on at most one command in each turn of the main loop.

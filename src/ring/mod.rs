@@ -1,5 +1,7 @@
 //! One reading of the whole sonar ring, and where the sensors of the ring look.
 
+pub mod drivers;
+
 /// What one sonar said.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Echo {

@@ -18,7 +18,7 @@
 //! ```
 //! use toposlam::FaultCounters;
 //! use toposlam::ring::{Echo, RingFrame};
-//! use toposlam::sonar::{SonarError, SonarRing};
+//! use toposlam::ring::drivers::{SonarError, SonarRing};
 //!
 //! struct Constant(u16);
 //!

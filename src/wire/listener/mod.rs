@@ -1,0 +1,5 @@
+//! The listener's side of the line: the map as it was heard.
+
+mod picture;
+
+pub use picture::Picture;
