@@ -6,7 +6,7 @@ use common::notes::Notes;
 use toposlam::reference::{self, PaperReference, SONARS, VERTICES};
 use toposlam::wire::{Arrival, Belief, Header, Location, Message, Picture, ResetCause, Worst};
 use toposlam::{FaultCounters, Filter, Mapper, MapperConfig, Observation, Turn};
-use toposlam_host::world::{Plan, RobotModel, Simulation};
+use toposlam_sim::world::{Plan, RobotModel, Simulation};
 
 fn config<C>(filter: C) -> MapperConfig<SONARS, C> {
     let (geometry, place) = (reference::RING, reference::PLACE);

@@ -4,7 +4,7 @@ use toposlam::persist::snapshot::{Resume, Snapshot, SnapshotError, Writer};
 use toposlam::reference::{self, PaperReference, SONARS, VERTICES};
 use toposlam::wire::{ResetCause, map_digest};
 use toposlam::{FaultCounters, Filter, Mapper, MapperConfig};
-use toposlam_host::world::{Plan, RobotModel, Simulation};
+use toposlam_sim::world::{Plan, RobotModel, Simulation};
 
 use super::common::notes::Notes;
 

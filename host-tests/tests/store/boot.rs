@@ -6,8 +6,8 @@ use toposlam::persist::snapshot::SnapshotError;
 use toposlam::persist::store::{BootOutcome, BootPolicy, BootReport, StoreError, resume};
 use toposlam::wire::Message;
 use toposlam::{FaultCounters, Filter};
-use toposlam_host::chip::{Cut, Tear};
-use toposlam_host::world::{Plan, RobotModel, Simulation};
+use toposlam_sim::chip::{Cut, Tear};
+use toposlam_sim::world::{Plan, RobotModel, Simulation};
 
 type Robot16 = Box<reference::RobotMapper>;
 

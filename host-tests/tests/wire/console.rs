@@ -9,7 +9,7 @@ use toposlam::reference::{self, HYPOTHESES, RobotMapper, SONARS};
 use toposlam::wire::{
     Command, Encoder, Inbox, Info, Message, Outcome, Refusal, ResetCause, Settings, Staging, Version,
 };
-use toposlam_host::world::{Plan, RobotModel, Simulation};
+use toposlam_sim::world::{Plan, RobotModel, Simulation};
 
 /// Turns after which the robot has found some places.
 pub(crate) const TURNS: usize = 2000;
