@@ -176,8 +176,8 @@ impl Format for WeightFactors {
 
 impl Format for FaultCounters {
     fn format(&self, f: Formatter<'_>) {
-        for kind in FaultKind::ALL.into_iter().filter(|kind| self.of(*kind) > 0) {
-            write!(f, "{} {=u32} ", kind, self.of(kind));
+        for kind in FaultKind::ALL.into_iter().filter(|kind| self.count(*kind) > 0) {
+            write!(f, "{} {=u32} ", kind, self.count(kind));
         }
     }
 }

@@ -256,7 +256,7 @@ impl<'buffer> Exploration<'buffer> {
 
     /// How often the drive lost its way.
     pub fn times_lost(&self) -> u32 {
-        self.robot.drive().faults().of(FaultKind::DriveLost)
+        self.robot.drive().faults().count(FaultKind::DriveLost)
     }
 
     /// The vertex that the best map takes each place for; `None` for a place that the history has forgotten.

@@ -30,7 +30,7 @@ fn with_faults_no_turn_and_no_place_is_lost_and_every_fault_is_counted() {
     assert!(to_robot.dropped_bytes > 0 && to_robot.flipped_bits > 0 && from_robot.dropped_bytes > 0);
     assert!(life.operator.restored >= HOURS && life.operator.repeated > 0 && life.kept > 0);
     let counted = [FaultKind::RingBlind, FaultKind::WireCorrupt, FaultKind::CommandFlood, FaultKind::CommandRefused];
-    assert!(counted.into_iter().all(|kind| life.faults.of(kind) > 0), "{:?}", life.faults);
+    assert!(counted.into_iter().all(|kind| life.faults.count(kind) > 0), "{:?}", life.faults);
 }
 
 #[test]

@@ -189,7 +189,7 @@ impl Pilot {
 
     /// Turns to where there is most room and starts over; how the robot left the last place says nothing any more.
     fn give_up<const SONARS: usize>(&mut self, scan: &Scan<'_, SONARS>) -> Suggestion {
-        self.faults.count(FaultKind::DriveLost);
+        self.faults.record(FaultKind::DriveLost);
         self.left = Left::Unknown;
         let most_room = scan.echoes().max_by_key(|(range_mm, _)| *range_mm);
         self.target_mrad = most_room.map_or(0, |(_, bearing_mrad)| bearing_mrad);

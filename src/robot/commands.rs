@@ -77,7 +77,7 @@ impl<const SONARS: usize, const N: usize, const V: usize, const HISTORY: usize> 
         let Self { mapper, drive, staging, encoder, faults, .. } = self;
         let bytes = staging.commit()?;
         if restore(mapper, drive, bytes, Resume::Elsewhere).is_err() {
-            faults.count(FaultKind::SnapshotRejected);
+            faults.record(FaultKind::SnapshotRejected);
             return Err(Refusal::BadSnapshot);
         }
         let mut line = Line { encoder, faults, board };

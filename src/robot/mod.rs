@@ -196,7 +196,7 @@ impl<'buffer, const SONARS: usize, const N: usize, const V: usize, const HISTORY
         if self.drive.is_at_place() {
             self.mapper.stay();
         }
-        let times_lost = self.drive.faults().of(FaultKind::DriveLost);
+        let times_lost = self.drive.faults().count(FaultKind::DriveLost);
         if times_lost != self.times_lost {
             self.times_lost = times_lost;
             self.mapper.carried();
@@ -225,7 +225,7 @@ impl<'buffer, const SONARS: usize, const N: usize, const V: usize, const HISTORY
                 self.places_since = 0;
             }
             Ok(Err(KeepError::NoStore)) => {}
-            Ok(Err(KeepError::Failed)) | Err(_) => self.faults.count(FaultKind::StoreFailed),
+            Ok(Err(KeepError::Failed)) | Err(_) => self.faults.record(FaultKind::StoreFailed),
         }
     }
 
@@ -239,7 +239,7 @@ impl<'buffer, const SONARS: usize, const N: usize, const V: usize, const HISTORY
         let restored = restore(mapper, drive, bytes, resume);
         match restored {
             Ok(()) => self.localise_only = self.mapper.filter().is_localise_only(),
-            Err(_) => self.faults.count(FaultKind::SnapshotRejected),
+            Err(_) => self.faults.record(FaultKind::SnapshotRejected),
         }
         restored
     }
@@ -254,7 +254,7 @@ impl<'buffer, const SONARS: usize, const N: usize, const V: usize, const HISTORY
             let turn_ms = now_ms.wrapping_sub(last_ms);
             self.worst_turn_ms = self.worst_turn_ms.max(turn_ms);
             if turn_ms > u32::from(self.config.turn_bound_ms) {
-                self.faults.count(FaultKind::LoopLate);
+                self.faults.record(FaultKind::LoopLate);
             }
         }
         self.last_turn_ms = Some(now_ms);
@@ -335,7 +335,7 @@ impl<BOARD: Board> Line<'_, BOARD> {
         let frame = self.encoder.encode(message, &mut bytes).map_err(|_| QueueFull)?;
         let sent = self.board.send(frame);
         if sent.is_err() {
-            self.faults.count(FaultKind::WireFull);
+            self.faults.record(FaultKind::WireFull);
         }
         sent
     }

@@ -103,13 +103,13 @@ fn when_the_bridge_is_cut_off_every_sensor_is_dead_and_a_healed_line_works_again
     link.cut = true;
     let mut ring = Srf08Ring::new(Sc18im700::new(link, 100), waited, Srf08Config::DEFAULT).unwrap();
     assert_eq!(ring.read(&mut faults), RingFrame { echoes: [Echo::Dead; 16] });
-    assert_eq!(faults.of(FaultKind::BusError), 16);
+    assert_eq!(faults.count(FaultKind::BusError), 16);
     let (cut, waited) = ring.release();
     bridge = Sc18im700::new(Link { cut: false, ..cut.release() }, 100);
     bridge.start().unwrap();
     let mut ring = Srf08Ring::new(bridge, waited, Srf08Config::DEFAULT).unwrap();
     assert_eq!(ring.read(&mut faults), world_frame(1));
-    assert_eq!(faults.of(FaultKind::BusError), 16);
+    assert_eq!(faults.count(FaultKind::BusError), 16);
 }
 
 #[test]
@@ -120,7 +120,7 @@ fn after_the_last_frame_of_the_world_the_ring_is_dead_and_does_not_hang() {
     let mut faults = FaultCounters::new();
     ring.read(&mut faults);
     assert_eq!(ring.read(&mut faults), RingFrame { echoes: [Echo::Dead; 16] });
-    assert_eq!(faults.of(FaultKind::SonarSilent), 16);
+    assert_eq!(faults.count(FaultKind::SonarSilent), 16);
 }
 
 #[test]

@@ -163,8 +163,8 @@ impl Soak {
         let driver = *exploration.ring_faults();
         let counted_from = auditor.restored_at.max(toposlam::reference::HISTORY as u64);
         let account = Account {
-            sonar_silent: driver.of(FaultKind::SonarSilent).into(),
-            bus_error: driver.of(FaultKind::BusError).into(),
+            sonar_silent: driver.count(FaultKind::SonarSilent).into(),
+            bus_error: driver.count(FaultKind::BusError).into(),
             history_full: places.saturating_sub(counted_from),
             ..auditor.account
         };
@@ -282,11 +282,11 @@ impl Life {
         hold(observed == places, format!("the filter has {observed} places, reported were {places}"));
         hold(*out_of_order == 0, format!("{out_of_order} places had a number out of order"));
         for (kind, expected) in self.account.rows() {
-            let counted = u64::from(self.faults.of(kind));
+            let counted = u64::from(self.faults.count(kind));
             hold(counted == expected, format!("{kind:?} was counted {counted} times, not {expected}"));
         }
         for kind in [FaultKind::LoopLate, FaultKind::StoreFailed, FaultKind::SnapshotRejected, FaultKind::WireFull] {
-            hold(self.faults.of(kind) == 0, format!("{kind:?} was counted {} times", self.faults.of(kind)));
+            hold(self.faults.count(kind) == 0, format!("{kind:?} was counted {} times", self.faults.count(kind)));
         }
         mistakes
     }
@@ -310,7 +310,7 @@ impl Life {
             format!("stopped by a wall in {} turns", self.bumps),
         ];
         lines.extend(fault_lines(&self.faults).into_iter().map(|line| format!("fault {line}")));
-        lines.push(format!("fault LoopLate: {}", self.faults.of(FaultKind::LoopLate)));
+        lines.push(format!("fault LoopLate: {}", self.faults.count(FaultKind::LoopLate)));
         lines.push(format!(
             "against the true map: exact {}, edge F1 {:.2}, located in {:.0} % of the places that are remembered",
             if self.score.exact { "yes" } else { "no" },
