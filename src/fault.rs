@@ -18,7 +18,7 @@ pub enum FaultKind {
     /// A sonar did not answer in time.
     SonarSilent = 0,
     /// A sonar answered with a value outside what its data sheet allows.
-    SonarNonsense = 1,
+    SonarOutOfRange = 1,
     /// The sensor bus reported an error in the middle of a frame.
     BusError = 2,
     /// A ring frame had too few live sensors to look for a place.
@@ -53,7 +53,7 @@ impl FaultKind {
     /// Every kind, in the order of its number.
     pub const ALL: [Self; 16] = [
         Self::SonarSilent,
-        Self::SonarNonsense,
+        Self::SonarOutOfRange,
         Self::BusError,
         Self::RingBlind,
         Self::RadiusOutOfRange,

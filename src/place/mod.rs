@@ -257,7 +257,7 @@ impl<const SONARS: usize> PlaceDetector<SONARS> {
                 Echo::Dead => DEAD,
                 Echo::Silence => SILENT,
                 Echo::Range { range_mm } if range_mm < self.config.range_min_mm => {
-                    self.faults.record(FaultKind::SonarNonsense);
+                    self.faults.record(FaultKind::SonarOutOfRange);
                     DEAD
                 }
                 Echo::Range { range_mm } if range_mm > self.config.range_max_mm => SILENT,

@@ -122,7 +122,7 @@ fn silence_all_around_is_no_place_and_no_fault() {
 fn zero_ranges_are_nonsense_and_no_place() {
     let mut detector = started::<16>();
     assert_eq!(places(&mut detector, &[RingFrame { echoes: [Echo::Range { range_mm: 0 }; 16] }; 40]), []);
-    assert_eq!(detector.faults().count(FaultKind::SonarNonsense), 640);
+    assert_eq!(detector.faults().count(FaultKind::SonarOutOfRange), 640);
     assert_eq!(detector.faults().count(FaultKind::RingBlind), 40);
 }
 

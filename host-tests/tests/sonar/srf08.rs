@@ -59,7 +59,7 @@ fn a_sensor_in_trouble_is_dead_and_counted_and_the_others_go_on() {
         (SensorFault::Absent, Echo::Dead, Some(SonarFault::Silent)),
         (SensorFault::NeverDone, Echo::Dead, Some(SonarFault::Silent)),
         (SensorFault::RefusesData, Echo::Dead, Some(SonarFault::Silent)),
-        (SensorFault::Nonsense, Echo::Dead, Some(SonarFault::Nonsense)),
+        (SensorFault::OutOfRange, Echo::Dead, Some(SonarFault::OutOfRange)),
         (SensorFault::BlocksBus, Echo::Dead, Some(SonarFault::Bus)),
         (SensorFault::Zeros, Echo::Silence, None),
     ];
@@ -160,6 +160,6 @@ fn together_means_one_write_to_the_general_call_address() {
     let mut ring = Srf08Ring::<_, _, 2>::new(I2cMock::new(&expected), &mut waited, config).unwrap();
     let mut faults = FaultCounters::new();
     assert_eq!(ring.read(&mut faults).echoes, [Echo::Range { range_mm: 1000 }, Echo::Dead]);
-    assert_eq!(ring.last_error(), Some(SonarError { sensor: 1, fault: SonarFault::Nonsense }));
+    assert_eq!(ring.last_error(), Some(SonarError { sensor: 1, fault: SonarFault::OutOfRange }));
     ring.release().0.done();
 }

@@ -58,7 +58,7 @@ pub struct Account {
     /// Sonars on a stuck bus.
     pub bus_error: u64,
     /// Ranges below what a sonar can measure, in frames that were mapped.
-    pub sonar_nonsense: u64,
+    pub sonar_out_of_range: u64,
     /// Mapped frames with too few live sonars.
     pub ring_blind: u64,
     /// What a decoder of the same bytes takes for no request.
@@ -76,7 +76,7 @@ impl Account {
         [
             (FaultKind::SonarSilent, self.sonar_silent),
             (FaultKind::BusError, self.bus_error),
-            (FaultKind::SonarNonsense, self.sonar_nonsense),
+            (FaultKind::SonarOutOfRange, self.sonar_out_of_range),
             (FaultKind::RingBlind, self.ring_blind),
             (FaultKind::WireCorrupt, self.wire_corrupt),
             (FaultKind::CommandFlood, self.command_flood),
@@ -245,10 +245,10 @@ impl Auditor {
             return;
         }
         let place = toposlam::reference::PLACE;
-        let is_nonsense = |echo: &&Echo| matches!(echo, Echo::Range { range_mm } if *range_mm < place.range_min_mm);
-        let nonsense = frame.echoes.iter().filter(is_nonsense).count();
-        let live = SONARS - nonsense - frame.dead_sensors().count();
-        self.account.sonar_nonsense += nonsense as u64;
+        let is_out_of_range = |echo: &&Echo| matches!(echo, Echo::Range { range_mm } if *range_mm < place.range_min_mm);
+        let out_of_range = frame.echoes.iter().filter(is_out_of_range).count();
+        let live = SONARS - out_of_range - frame.dead_sensors().count();
+        self.account.sonar_out_of_range += out_of_range as u64;
         self.account.ring_blind += u64::from(live < usize::from(place.live_sensors_min));
     }
 }
