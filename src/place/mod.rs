@@ -210,13 +210,13 @@ impl<const SONARS: usize> PlaceDetector<SONARS> {
     }
 
     /// Whether the robot is still at the place that was reported last.
-    pub const fn is_leaving(&self) -> bool {
+    pub const fn is_at_place(&self) -> bool {
         self.leaving
     }
 
     /// The robot has not moved from the place that was reported last: what the ring hears while it turns on the spot does not
     /// mean that it leaves.
-    pub const fn stay(&mut self) {
+    pub const fn hold_place(&mut self) {
         if self.leaving {
             self.against = 0;
         }

@@ -155,8 +155,8 @@ impl Soak {
                 }
             });
             kept += u64::from(!mem::take(&mut exploration.board().kept).is_empty());
-            let suggestion = exploration.board().suggestion;
-            exploration.drive(suggestion);
+            let velocity = exploration.board().velocity;
+            exploration.drive(velocity);
         }
         let places = exploration.places() as u64;
         let observed = u64::from(exploration.robot().mapper().filter().observed());
