@@ -10,7 +10,7 @@ use toposlam::RobustConfig;
 
 fn evaluate(arguments: &[&str], threads: &str) -> Output {
     Command::new(env!("CARGO_BIN_EXE_toposlam"))
-        .current_dir(env!("CARGO_MANIFEST_DIR"))
+        .current_dir(concat!(env!("CARGO_MANIFEST_DIR"), "/../eval"))
         .env("RUST_BACKTRACE", "0")
         .args(["evaluate", "--threads", threads])
         .args(arguments)

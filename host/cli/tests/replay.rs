@@ -97,7 +97,7 @@ fn laps_of_a_round_on_the_voronoi_graph_repeat_and_their_map_is_a_cycle() {
 
 #[test]
 fn the_real_laps_along_the_walls_repeat_one_place_and_give_no_cycle() {
-    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../shared/data/scitos-g5/sensor_readings_24.data");
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared/data/scitos-g5/sensor_readings_24.data");
     if !path.exists() {
         // Written past the capture of test output, so that it is seen.
         let _ = writeln!(std::io::stderr(), "SKIPPED: no recording at ../shared/data/scitos-g5");
