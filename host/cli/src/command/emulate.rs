@@ -22,7 +22,7 @@ use super::hardship;
 use super::heard::Heard;
 
 /// Where `cargo firmware` puts the image.
-const IMAGE: &str = "thumbv7em-none-eabihf/release/robot";
+const IMAGE: &str = "thumbv7em-none-eabihf/firmware/robot";
 
 /// Arguments of `toposlam emulate`.
 #[derive(Args)]
