@@ -1,4 +1,4 @@
-//! The filters that can be evaluated, behind one interface, each with the smallest capacities that will do.
+//! The filters that can be evaluated, behind one interface, with capacities of which each is a few seconds of compiling.
 
 mod paper;
 mod robust;
@@ -60,7 +60,7 @@ pub fn choose(settings: &Settings, explored: usize) -> Result<Start, EvaluationE
             if NgramLength::new(config.ngram_length) != Ok(length) {
                 return Err(EvaluationError::Config(ConfigError("ngram_length")));
             }
-            paper::choose(config.particles.into(), settings, ngrams)
+            paper::choose(settings, ngrams)
         }
         Filter::Robust(config) => {
             config.check(MAX_HYPOTHESES).map_err(EvaluationError::Config)?;
