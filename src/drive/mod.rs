@@ -26,7 +26,8 @@ pub use pilot::PilotState;
 pub use wheels::{DifferentialDrive, MotorError, Wheel, WheelSpeeds, WheelsConfig, WheelsConfigError};
 
 #[cfg(feature = "snapshot")]
-use crate::persist::snapshot::{Reader, Resume, SnapshotError, Writer};
+pub(crate) use departures::is_departure;
+
 use crate::place::{Place, PlaceDetector};
 use crate::{FaultCounters, Filter, Turn, Update};
 use navigator::Navigator;
@@ -144,36 +145,17 @@ impl<const V: usize, const HISTORY: usize> Drive<V, HISTORY> {
         self.pilot.lose_way();
     }
 
-    /// Writes the drive's section of a snapshot: what it did at the places that the filter remembers.
-    ///
-    /// # Errors
-    /// [`SnapshotError::Full`].
+    /// How the robot left each place of the history, the oldest first: one byte each.
     #[cfg(feature = "snapshot")]
-    pub fn save(&self, writer: &mut Writer<'_>) -> Result<(), SnapshotError> {
-        self.navigator.save(writer)
+    pub(crate) fn departures(&self) -> impl ExactSizeIterator<Item = u8> + '_ {
+        self.navigator.departures()
     }
 
-    /// Whether a section of a snapshot can be restored.
-    ///
-    /// # Errors
-    /// [`SnapshotError`] says what is wrong with it.
+    /// Explores from here on, with these departures at the places of the history and no others.
     #[cfg(feature = "snapshot")]
-    pub fn check(section: Reader<'_>) -> Result<(), SnapshotError> {
-        Navigator::<V, HISTORY>::check(section)
-    }
-
-    /// Goes on with a section of a snapshot, or with nothing known, exploring.
-    ///
-    /// # Errors
-    /// As [`Drive::check`].
-    #[cfg(feature = "snapshot")]
-    pub fn restore(&mut self, section: Option<Reader<'_>>, resume: Resume) -> Result<(), SnapshotError> {
-        self.navigator.restore(section)?;
-        match resume {
-            Resume::InPlace => self.pilot.lose_way(),
-            Resume::Elsewhere => self.carried(),
-        }
-        Ok(())
+    pub(crate) fn resume(&mut self, departures: impl Iterator<Item = u8>) {
+        self.navigator.resume(departures);
+        self.pilot.lose_way();
     }
 
     /// How often the drive lost its way.
