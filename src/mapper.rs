@@ -97,13 +97,13 @@ impl<const SONARS: usize, const V: usize, F: Filter<V>> Mapper<SONARS, V, F> {
 
     /// Announces that the next place may not be a neighbour of the last one: the robot was kidnapped, or its drive lost the
     /// Voronoi graph.
-    pub fn notify_kidnapped(&mut self) {
+    pub fn kidnapped(&mut self) {
         self.starts_sequence = true;
     }
 
-    /// Announces that the robot has not left the last place; see [`PlaceDetector::stay`].
-    pub fn stay(&mut self) {
-        self.detector.stay();
+    /// Announces that the robot has not left the last place; see [`PlaceDetector::hold_place`].
+    pub fn hold_place(&mut self) {
+        self.detector.hold_place();
     }
 
     /// The best map.

@@ -1,7 +1,7 @@
 //! What a robot starts with.
 
 use super::*;
-use toposlam::drive::Suggestion;
+use toposlam::drive::VelocityCommand;
 use toposlam::persist::snapshot::SnapshotError;
 use toposlam::persist::store::{BootOutcome, BootPolicy, BootReport, StoreError, resume};
 use toposlam::reference::ReferenceRobot;
@@ -92,7 +92,7 @@ impl Board for Line {
         Ok(())
     }
 
-    fn follow(&mut self, _: Suggestion) {}
+    fn follow(&mut self, _: VelocityCommand) {}
 
     fn feed_watchdog(&mut self) {}
 

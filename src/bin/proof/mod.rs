@@ -60,8 +60,8 @@ pub(crate) fn fault() {
     let mut counters = FaultCounters::new().opaque();
     let other = FaultCounters::default().opaque();
     for kind in FaultKind::ALL.opaque() {
-        counters.count(kind);
-        black_box(counters.of(kind));
+        counters.record(kind);
+        black_box(counters.count(kind));
     }
     counters.add(&other);
     black_box(counters);
@@ -262,7 +262,7 @@ pub(crate) fn mapper() {
         black_box(mapper.observe(&any_frame(), any_turn()));
     }
     robust(mapper.filter_mut());
-    mapper.notify_kidnapped();
+    mapper.kidnapped();
     black_box((mapper.faults(), mapper.map(), mapper.filter(), mapper.detector()));
     snapshot(mapper);
     static REPORTER: ConstStaticCell<Reporter<VERTICES>> = ConstStaticCell::new(Reporter::new());
