@@ -8,7 +8,7 @@ use toposlam::wire::{
     Arrival, Belief, Capacities, Header, Hello, Location, Message, Picture, Reporter, ResetCause, Worst,
 };
 use toposlam::{FaultCounters, Filter, Mapper, MapperConfig, Observation, Turn};
-use toposlam_host::world::{Plan, RobotModel, Simulation};
+use toposlam_sim::world::{Plan, RobotModel, Simulation};
 
 fn config<C>(filter: C) -> MapperConfig<SONARS, C> {
     let (geometry, place) = (reference::RING, reference::PLACE);

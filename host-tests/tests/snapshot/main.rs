@@ -91,7 +91,7 @@ fn held<const N: usize, const V: usize, const T: usize>(filter: &RobustFilter<N,
 
 /// Drives of all kinds; the histories of the filters are shorter.
 fn drives(places: usize) -> Vec<Drive> {
-    let walk = |environment: &toposlam_host::evaluation::environment::Environment, hints, seed, carried: &[usize]| {
+    let walk = |environment: &toposlam_eval::environment::Environment, hints, seed, carried: &[usize]| {
         let mut robot = Robot::new(environment, hints, seed);
         (0..places)
             .map(|index| {

@@ -4,7 +4,7 @@ use toposlam::persist::snapshot::{Resume, Snapshot, SnapshotError, Writer};
 use toposlam::reference::{self, SONARS, VERTICES};
 use toposlam::wire::map_digest;
 use toposlam::{Filter, Mapper, MapperConfig};
-use toposlam_host::world::{Plan, RobotModel, Simulation};
+use toposlam_sim::world::{Plan, RobotModel, Simulation};
 
 use super::common::notes::Notes;
 

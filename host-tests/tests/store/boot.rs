@@ -8,8 +8,8 @@ use toposlam::reference::ReferenceRobot;
 use toposlam::robot::{Board, KeepError, RobotConfig};
 use toposlam::wire::{Decoder, Message, Progress, QueueFull};
 use toposlam::{FaultCounters, Filter};
-use toposlam_host::chip::{Cut, Tear};
-use toposlam_host::world::{Plan, RobotModel, Simulation};
+use toposlam_sim::chip::{Cut, Tear};
+use toposlam_sim::world::{Plan, RobotModel, Simulation};
 
 type Robot16 = Box<reference::RobotMapper>;
 

@@ -12,7 +12,7 @@ use toposlam::persist::snapshot::{Snapshot, Writer};
 use toposlam::persist::store::Store;
 use toposlam::wire::map_digest;
 use toposlam::{RobustConfig, reference};
-use toposlam_host::chip::FlashModel;
+use toposlam_sim::chip::FlashModel;
 
 /// The two last sectors of the reference robot's flash, and pages as an nRF52840 has them.
 type Sectors = FlashModel<1, { 128 * 1024 }>;

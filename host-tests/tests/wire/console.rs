@@ -10,7 +10,7 @@ use toposlam::wire::{
     Capacities, Command, Encoder, Hello, Inbox, Info, Message, Outcome, Refusal, Reporter, ResetCause, Settings,
     Staging, Version,
 };
-use toposlam_host::world::{Plan, RobotModel, Simulation};
+use toposlam_sim::world::{Plan, RobotModel, Simulation};
 
 /// Turns after which the robot has found some places.
 pub(crate) const TURNS: usize = 2000;
