@@ -35,7 +35,8 @@ pub use route_planner::{Goal, GoalStatus};
 pub use wheels::{DifferentialDrive, MotorError, Wheel, WheelSpeeds, WheelsConfig, WheelsConfigError};
 
 #[cfg(feature = "snapshot")]
-use crate::persist::snapshot::{Reader, Resume, SnapshotError, Writer};
+pub(crate) use departures::is_departure;
+
 use crate::place::{Place, PlaceDetector};
 use crate::{FaultCounters, Filter, Turn, Update};
 use local_planner::LocalPlanner;
@@ -155,36 +156,17 @@ impl<const V: usize, const HISTORY: usize> Drive<V, HISTORY> {
         self.local_planner.forget_edge();
     }
 
-    /// Writes the drive's section of a snapshot: the exits taken at the places that the filter remembers.
-    ///
-    /// # Errors
-    /// [`SnapshotError::Full`].
+    /// How the robot left each place of the history, oldest first: one byte each.
     #[cfg(feature = "snapshot")]
-    pub fn save(&self, writer: &mut Writer<'_>) -> Result<(), SnapshotError> {
-        self.route_planner.save(writer)
+    pub(crate) fn departures(&self) -> impl ExactSizeIterator<Item = u8> + '_ {
+        self.route_planner.departures()
     }
 
-    /// Checks whether a section of a snapshot can be restored.
-    ///
-    /// # Errors
-    /// [`SnapshotError`] with the reason.
+    /// Replaces the departures at the places of the history, oldest first, and explores.
     #[cfg(feature = "snapshot")]
-    pub fn check(section: Reader<'_>) -> Result<(), SnapshotError> {
-        RoutePlanner::<V, HISTORY>::check(section)
-    }
-
-    /// Restores a section of a snapshot, or an empty history without one, and explores.
-    ///
-    /// # Errors
-    /// As [`Drive::check`].
-    #[cfg(feature = "snapshot")]
-    pub fn restore(&mut self, section: Option<Reader<'_>>, resume: Resume) -> Result<(), SnapshotError> {
-        self.route_planner.restore(section)?;
-        match resume {
-            Resume::InPlace => self.local_planner.forget_edge(),
-            Resume::Elsewhere => self.kidnapped(),
-        }
-        Ok(())
+    pub(crate) fn resume(&mut self, departures: impl Iterator<Item = u8>) {
+        self.route_planner.resume(departures);
+        self.local_planner.forget_edge();
     }
 
     /// Faults since the start: how often the drive lost the graph ([`FaultKind::DriveLost`](crate::FaultKind::DriveLost)).

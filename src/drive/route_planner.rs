@@ -5,8 +5,6 @@ use rand_core::Rng;
 use super::departures::{Departures, WAYS, Way};
 use super::local_planner::Exits;
 use crate::filter::draws;
-#[cfg(feature = "snapshot")]
-use crate::persist::snapshot::{Reader, SnapshotError, Writer};
 use crate::{Filter, Update};
 
 /// A robot is at a vertex when the filter believes so with at least this probability, in units of 2⁻¹⁶.
@@ -93,21 +91,15 @@ impl<const V: usize, const HISTORY: usize> RoutePlanner<V, HISTORY> {
     }
 
     #[cfg(feature = "snapshot")]
-    pub(super) fn save(&self, writer: &mut Writer<'_>) -> Result<(), SnapshotError> {
-        self.departures.save(writer)
+    pub(super) fn departures(&self) -> impl ExactSizeIterator<Item = u8> + '_ {
+        self.departures.iter()
     }
 
+    /// Explores from here on, with these departures and no others.
     #[cfg(feature = "snapshot")]
-    pub(super) fn check(section: Reader<'_>) -> Result<(), SnapshotError> {
-        Departures::<HISTORY>::check(section)
-    }
-
-    /// Goes on with what was saved, exploring.
-    #[cfg(feature = "snapshot")]
-    pub(super) fn restore(&mut self, section: Option<Reader<'_>>) -> Result<(), SnapshotError> {
+    pub(super) fn resume(&mut self, departures: impl Iterator<Item = u8>) {
         self.set_goal(Goal::Explore);
-        self.departures.clear();
-        section.map_or(Ok(()), |section| self.departures.restore(section))
+        self.departures.replace(departures);
     }
 
     /// The filter has taken in a place.
