@@ -9,6 +9,7 @@ mod specification;
 
 use common::environments::{easy, floor, six_rooms};
 use common::robot::{Hints, Robot};
+use toposlam::persist::Persist;
 use toposlam::persist::snapshot::{FILTER_SECTION, Reader, Snapshot, SnapshotError, Writer};
 use toposlam::{Fingerprint, Map, Observation, RobustConfig, RobustFilter, Update};
 
@@ -135,7 +136,7 @@ fn saved<const N: usize, const V: usize, const T: usize>(
 ) -> Result<Vec<u8>, SnapshotError> {
     let mut buffer = vec![0; room];
     let mut writer = Writer::new(&mut buffer)?;
-    writer.section(FILTER_SECTION, |section| filter.save(section))?;
+    writer.stage(filter)?;
     let length = writer.finish()?;
     buffer.truncate(length);
     Ok(buffer)

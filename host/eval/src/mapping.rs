@@ -23,7 +23,7 @@
 
 use toposlam::reference::{self, PaperReference, VERTICES};
 use toposlam::ring::{RingFrame, RingGeometry};
-use toposlam::wire::{Belief, ResetCause, Worst};
+use toposlam::wire::{Belief, Worst};
 use toposlam::{FaultCounters, Filter, Map, Mapper, MapperConfig, MapperError, Turn};
 
 use toposlam_sim::Step;
@@ -81,8 +81,7 @@ impl<const SONARS: usize> Mapping<SONARS> {
     /// Takes one frame, and what the drive knows of how the robot left the place before; gives a step when the robot has
     /// just been at a place.
     pub fn observe(&mut self, frame: &RingFrame<SONARS>, turn: Option<Turn>) -> Option<Step> {
-        let faults = FaultCounters::new();
-        let (place, update) = either!(&mut self.stages, mapper => mapper.observe(frame, turn, &faults, |_| Ok(())))?;
+        let (place, update) = either!(&mut self.stages, mapper => mapper.observe(frame, turn))?;
         if let Stages::Paper(mapper, ancestry) = &mut self.stages {
             let particles = mapper.filter().particles().iter();
             ancestry.advance(particles.map(|particle| (particle.parent.into(), particle.place.into())));
@@ -105,11 +104,7 @@ impl<const SONARS: usize> Mapping<SONARS> {
 
     /// What went wrong: in the detector and in the filter.
     pub fn faults(&self) -> FaultCounters {
-        either!(&self.stages, mapper => {
-            let mut faults = *mapper.detector().faults();
-            faults.add(mapper.filter().faults());
-            faults
-        })
+        either!(&self.stages, mapper => mapper.faults())
     }
 
     /// Where the robot may be after the last place, and how far the map is to be trusted.
@@ -182,6 +177,6 @@ fn started<const SONARS: usize, F: Filter<VERTICES>>(
 ) -> Result<Box<Mapper<SONARS, VERTICES, F>>, MapperError> {
     let mut mapper = Box::new(Mapper::new());
     let (place, seed) = (reference::PLACE, reference::SEED);
-    mapper.start(&MapperConfig { geometry, place, filter, seed, boot: 0, reset_cause: ResetCause::Unknown })?;
+    mapper.start(&MapperConfig { geometry, place, filter, seed })?;
     Ok(mapper)
 }

@@ -47,6 +47,11 @@ impl DriveArguments {
         Ok((load_plan(&self.plan)?, RobotModel::default().with_noise(self.noise)))
     }
 
+    /// The floor plan as it was given.
+    pub(super) fn plan(&self) -> &str {
+        &self.plan
+    }
+
     /// The seed of the drive.
     pub(super) const fn seed(&self) -> u64 {
         self.seed

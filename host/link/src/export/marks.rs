@@ -4,7 +4,8 @@ use svg::node::element::{Circle, Group, Line, Text};
 
 /// The colour of a map.
 pub const MAP_COLOUR: &str = "#b3261e";
-const ROBOT_COLOUR: &str = "#0b57d0";
+/// The colour of the robot.
+pub const ROBOT_COLOUR: &str = "#0b57d0";
 /// The radius of a vertex.
 pub const DOT_MM: f64 = 330.0;
 

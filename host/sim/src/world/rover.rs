@@ -92,6 +92,11 @@ impl Rover {
         (frame, truth)
     }
 
+    /// Where the robot is.
+    pub const fn position(&self) -> Point {
+        self.pose.position
+    }
+
     /// Drives on until the next frame.
     pub fn follow(&mut self, velocity: VelocityCommand) {
         let WheelSpeeds { left_permille, right_permille } = WheelSpeeds::from_velocity(velocity, &self.body.wheels);

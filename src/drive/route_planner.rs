@@ -3,10 +3,8 @@
 use rand_core::Rng;
 
 use super::departures::{Departures, WAYS, Way};
-use super::pilot::WaysOut;
+use super::local_planner::Exits;
 use crate::filter::draws;
-#[cfg(feature = "snapshot")]
-use crate::persist::snapshot::{Reader, SnapshotError, Writer};
 use crate::{Filter, Update};
 
 /// A robot is at a vertex when the filter believes so with at least this probability, in units of 2⁻¹⁶.
@@ -42,7 +40,7 @@ pub enum GoalStatus {
 
 /// Decides at places; remembers one byte for each of `HISTORY` places.
 #[derive(Clone, Debug)]
-pub(super) struct Navigator<const V: usize, const HISTORY: usize> {
+pub(super) struct RoutePlanner<const V: usize, const HISTORY: usize> {
     seed: u64,
     goal: Goal,
     goal_status: GoalStatus,
@@ -53,7 +51,7 @@ pub(super) struct Navigator<const V: usize, const HISTORY: usize> {
     departures: Departures<HISTORY>,
 }
 
-impl<const V: usize, const HISTORY: usize> Navigator<V, HISTORY> {
+impl<const V: usize, const HISTORY: usize> RoutePlanner<V, HISTORY> {
     pub(super) const fn new() -> Self {
         Self {
             seed: 0,
@@ -93,21 +91,15 @@ impl<const V: usize, const HISTORY: usize> Navigator<V, HISTORY> {
     }
 
     #[cfg(feature = "snapshot")]
-    pub(super) fn save(&self, writer: &mut Writer<'_>) -> Result<(), SnapshotError> {
-        self.departures.save(writer)
+    pub(super) fn departures(&self) -> impl ExactSizeIterator<Item = u8> + '_ {
+        self.departures.iter()
     }
 
+    /// Explores from here on, with these departures and no others.
     #[cfg(feature = "snapshot")]
-    pub(super) fn check(section: Reader<'_>) -> Result<(), SnapshotError> {
-        Departures::<HISTORY>::check(section)
-    }
-
-    /// Goes on with what was saved, exploring.
-    #[cfg(feature = "snapshot")]
-    pub(super) fn restore(&mut self, section: Option<Reader<'_>>) -> Result<(), SnapshotError> {
+    pub(super) fn resume(&mut self, departures: impl Iterator<Item = u8>) {
         self.set_goal(Goal::Explore);
-        self.departures.clear();
-        section.map_or(Ok(()), |section| self.departures.restore(section))
+        self.departures.replace(departures);
     }
 
     /// The filter has taken in a place.
@@ -123,8 +115,8 @@ impl<const V: usize, const HISTORY: usize> Navigator<V, HISTORY> {
     }
 
     /// Chooses the way out of the place that the robot stands at; `None` to stay.
-    pub(super) fn choose(&mut self, filter: &impl Filter<V>, ways: WaysOut) -> Option<u8> {
-        let known = self.departures.ways(filter, if ways.came_by_first { ways.count } else { 0 });
+    pub(super) fn choose(&mut self, filter: &impl Filter<V>, ways: Exits) -> Option<u8> {
+        let known = self.departures.ways(filter, if ways.is_entry_first { ways.count } else { 0 });
         self.decisions = self.decisions.wrapping_add(1);
         let chosen = match self.goal {
             Goal::Stop => None,

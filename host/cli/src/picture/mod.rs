@@ -1,5 +1,9 @@
 //! Pictures: a map over its floor plan, as SVG.
 
+mod animation;
+
+pub use animation::{Step, animate};
+
 use std::cmp::Reverse;
 
 use svg::Document;
