@@ -9,7 +9,7 @@ use toposlam::place::{Place, PlaceConfig, PlaceDetector};
 use toposlam::reference;
 use toposlam::ring::{Echo, RingFrame};
 use toposlam::{FaultKind, Turn};
-use toposlam_eval::recording::Ring;
+use toposlam_eval::range_csv::Ring;
 use toposlam_sim::world::{Journal, Plan, Report, RobotModel, SONARS, Simulation, SonarModel};
 
 /// Drives until so many nodes were visited.

@@ -42,7 +42,6 @@ enum Task {
     #[command(hide = true)]
     Robots(command::robots::Arguments),
     /// Tell an MQTT broker all that a robot on a line says.
-    #[cfg(feature = "mqtt")]
     Publish(command::publish::Arguments),
     /// Show the live map of a robot on a line in browsers.
     Serve(command::serve::Arguments),
@@ -65,7 +64,6 @@ fn main() -> anyhow::Result<()> {
         Task::Export(arguments) => command::export::run(&arguments),
         Task::Fleet(arguments) => command::fleet::run(&arguments),
         Task::Robots(arguments) => command::robots::run(&arguments),
-        #[cfg(feature = "mqtt")]
         Task::Publish(arguments) => command::publish::run(&arguments),
         Task::Serve(arguments) => command::serve::run(&arguments),
         Task::Command(arguments) => command::console::run(&arguments),

@@ -222,3 +222,19 @@ fn export_writes_the_map_of_a_recording_and_says_what_is_wrong_with_it() {
     assert!(complaint(&toposlam(&["export", name, "--format", "png"])).contains("graphml, dot, geojson, json, svg"));
     assert!(complaint(&toposlam(&["export", name, "--format", "geojson", "--edge-m", "0"])).contains("0.1 to 1000"));
 }
+
+#[cfg(not(all(feature = "mqtt", feature = "recording")))]
+#[test]
+fn a_command_that_the_build_leaves_out_names_its_feature() {
+    for (command, feature, is_built) in [
+        ("record", "recording", cfg!(feature = "recording")),
+        ("play", "recording", cfg!(feature = "recording")),
+        ("publish", "mqtt", cfg!(feature = "mqtt")),
+    ] {
+        if !is_built {
+            let text = complaint(&toposlam(&[command, "tcp:127.0.0.1:7070", "--seconds", "3"]));
+            let expected = format!("--features {feature} -- {command} tcp:127.0.0.1:7070 --seconds 3");
+            assert!(text.contains(&expected), "{text}");
+        }
+    }
+}

@@ -4,13 +4,12 @@ use std::path::PathBuf;
 
 use anyhow::Context;
 use clap::Args;
-use indicatif::{ProgressBar, ProgressStyle};
 use toposlam::reference::VERTICES;
 use toposlam::wire::map_digest;
 use toposlam::{FaultCounters, Map};
 use toposlam_cli::picture::{Drawing, draw};
+use toposlam_eval::faults::fault_lines;
 use toposlam_eval::mapping::score_path;
-use toposlam_eval::recording::fault_lines;
 use toposlam_sim::exploration::Exploration;
 use toposlam_sim::world::{Journal, Plan, RobotModel, TrueMap};
 
@@ -106,12 +105,6 @@ impl<'a> Summary<'a, VERTICES> {
             faults: exploration.faults(),
         }
     }
-}
-
-/// A bar that counts places.
-pub(super) fn progress_bar(places: usize) -> anyhow::Result<ProgressBar> {
-    let style = ProgressStyle::with_template("{bar:40} {pos}/{len} places, {elapsed}")?;
-    Ok(ProgressBar::new(places as u64).with_style(style))
 }
 
 fn yes_or_no(answer: bool) -> &'static str {

@@ -14,10 +14,11 @@ use toposlam::drive::VelocityCommand;
 use toposlam::reference::SNAPSHOT_BYTES;
 use toposlam::wire::{Belief, Evidence, Location, Message, Worst};
 use toposlam_cli::emulator::Emulation;
+use toposlam_cli::progress::Progress;
 use toposlam_sim::exploration::Exploration;
 use toposlam_sim::injector::FaultRates;
 
-use super::drive::{DriveArguments, Summary, fault_rate, progress_bar};
+use super::drive::{DriveArguments, Summary, fault_rate};
 use super::hardship;
 use super::heard::Heard;
 
@@ -75,7 +76,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
         velocities: Vec::new(),
     });
     let (tell_velocity, velocities) = mpsc::channel::<VelocityCommand>();
-    let progress = progress_bar(arguments.places)?;
+    let progress = Progress::new("", arguments.places, "places");
     let mut heard = Heard::new();
     let mut elsewhere = None;
     let mut frames = 0;
@@ -97,8 +98,8 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
             if repetition.exploration.map(&frame).is_some()
                 && let Some(step) = repetition.exploration.steps().last()
             {
-                bar.suspend(|| println!("{step}"));
-                bar.inc(1);
+                bar.println(step);
+                bar.increment();
             }
             let velocity = repetition.exploration.board().velocity;
             repetition.velocities.push(velocity);
@@ -130,7 +131,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
             })
         },
     )?;
-    progress.finish_and_clear();
+    drop(progress);
     if let Some(message) = elsewhere {
         bail!("the firmware says {message:?}, and this computer does not");
     }

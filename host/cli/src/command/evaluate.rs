@@ -3,13 +3,13 @@
 use super::filter::FilterArgument;
 use anyhow::{Context, ensure};
 use clap::{Args, ValueEnum};
-use indicatif::{ProgressBar, ProgressStyle};
 use std::{
     fs,
     num::NonZeroUsize,
     path::{Path, PathBuf},
 };
 use toposlam::{Config, Direction, NgramLength, RobustConfig};
+use toposlam_cli::progress::Progress;
 use toposlam_eval::{
     case::{Case, Placements},
     environment::Environment,
@@ -204,10 +204,9 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
 /// Evaluates one filter in one case, with a bar on the standard error, and says there what a reader should know.
 fn evaluate_with_progress(case: &Case, settings: &Settings) -> anyhow::Result<Vec<Row>> {
     let title = format!("{}, {} filter", case.name, settings.filter.name());
-    let bar = ProgressBar::new(settings.paths as u64).with_message(title.clone());
-    bar.set_style(ProgressStyle::with_template("{msg} {wide_bar} {pos}/{len} paths {eta}")?);
-    let rows = evaluate(case, settings, || bar.inc(1)).with_context(|| title.clone())?;
-    bar.finish_and_clear();
+    let bar = Progress::new(title.clone(), settings.paths, "paths");
+    let rows = evaluate(case, settings, || bar.increment()).with_context(|| title.clone())?;
+    drop(bar);
     if let Some(row) = rows.first() {
         if row.paths_not_exhaustive > 0 {
             eprintln!("{title}: {} of {} paths do not traverse every edge", row.paths_not_exhaustive, row.paths);

@@ -3,11 +3,11 @@
 
 use anyhow::ensure;
 use clap::Args;
-use rayon::prelude::*;
 use toposlam::drive::GoalStatus;
 use toposlam::reference::SNAPSHOT_BYTES;
 use toposlam::wire::Command;
 use toposlam_eval::mapping::score_exploration;
+use toposlam_eval::parallel;
 use toposlam_sim::exploration::Exploration;
 use toposlam_sim::injector::FaultRates;
 use toposlam_sim::world::{Plan, Report, RobotModel};
@@ -28,7 +28,7 @@ pub(crate) struct Arguments {
     noises: Vec<f64>,
     /// Runs for each plan and noise; run i has seed i.
     #[arg(long, default_value_t = 100)]
-    runs: u64,
+    runs: usize,
     /// Places of an exploration.
     #[arg(long, default_value_t = 300)]
     places: usize,
@@ -82,8 +82,8 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     for name in &arguments.plans {
         let plan = load_plan(name)?;
         for &noise in &arguments.noises {
-            let runs: Result<Vec<Run>, _> =
-                (1..=arguments.runs).into_par_iter().map(|seed| one(arguments, &plan, noise, seed)).collect();
+            let runs = parallel::map(arguments.runs, 0, |run| one(arguments, &plan, noise, run as u64 + 1))?;
+            let runs: Result<Vec<Run>, _> = runs.into_iter().collect();
             print_row(name, noise, &runs?, arguments.places);
         }
     }

@@ -11,7 +11,8 @@ use toposlam_link::export;
 use toposlam_link::layout::Layout;
 use toposlam_link::line;
 use toposlam_link::listener::{Event, Listener, Understanding};
-use toposlam_link::log::{self, LogError};
+#[cfg(feature = "recording")]
+use toposlam_link::recording::{self, RecordingError};
 
 /// Arguments of `toposlam export`.
 #[derive(Args)]
@@ -107,13 +108,19 @@ fn recorded(mut bytes: impl Read) -> io::Result<Listener> {
 }
 
 /// What is known at the end of a recording.
-fn replayed(path: &Path) -> Result<Listener, LogError> {
+#[cfg(feature = "recording")]
+fn replayed(path: &Path) -> Result<Listener, RecordingError> {
     let mut listener = Listener::new();
-    for bytes in log::frames(path)? {
+    for bytes in recording::frames(path)? {
         listener.feed(&bytes?, |_, _| ());
     }
     complain_of_gaps(&listener);
     Ok(listener)
+}
+
+#[cfg(not(feature = "recording"))]
+fn replayed(_: &Path) -> anyhow::Result<Listener> {
+    anyhow::bail!("this build reads no recordings; add --features recording to `cargo run --release`")
 }
 
 fn complain_of_gaps(listener: &Listener) {

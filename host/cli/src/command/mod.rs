@@ -12,11 +12,15 @@ pub(crate) mod fleet;
 mod hardship;
 mod heard;
 mod interrupt;
+#[cfg(not(all(feature = "mqtt", feature = "recording")))]
+mod missing;
 pub(crate) mod monitor;
+#[cfg(feature = "recording")]
 pub(crate) mod play;
 #[cfg(feature = "mqtt")]
 pub(crate) mod publish;
 mod rails;
+#[cfg(feature = "recording")]
 pub(crate) mod record;
 pub(crate) mod replay;
 pub(crate) mod robot;
@@ -24,3 +28,8 @@ pub(crate) mod robots;
 pub(crate) mod serve;
 pub(crate) mod simulate;
 pub(crate) mod soak;
+
+#[cfg(not(feature = "mqtt"))]
+pub(crate) use missing::publish;
+#[cfg(not(feature = "recording"))]
+pub(crate) use missing::{play, record};

@@ -9,7 +9,7 @@ use anyhow::Context;
 use clap::Args;
 use toposlam_link::broadcast::Broadcast;
 use toposlam_link::listener::Listener;
-use toposlam_link::log::Recording;
+use toposlam_link::recording::Recording;
 
 use super::console::print_map;
 use super::interrupt::Interrupt;

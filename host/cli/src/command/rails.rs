@@ -1,11 +1,11 @@
 //! `toposlam simulate --on-rails`: the robot is led along the true Voronoi graph, so that the detector and the filters stand alone.
 
 use clap::{Args, ValueEnum};
-use toposlam::reference;
+use toposlam_cli::progress::Progress;
 use toposlam_eval::mapping::Mapping;
 use toposlam_sim::world::{Journal, Simulation};
 
-use super::drive::{DriveArguments, Summary, progress_bar};
+use super::drive::{DriveArguments, Summary};
 use super::filter::FilterArgument;
 
 /// How a robot on rails is mapped.
@@ -35,8 +35,8 @@ pub(super) fn run(drive: &DriveArguments, rails: &OnRails, places: usize, frames
     let (plan, model) = drive.world()?;
     let mut simulation = Simulation::new(&plan, model, drive.seed())?;
     let mut journal = Journal::new(simulation.true_map());
-    let mut mapping = Mapping::start(reference::RING, rails.filter.into())?;
-    let progress = progress_bar(places)?;
+    let mut mapping = Mapping::reference(rails.filter.into())?;
+    let progress = Progress::new("", places, "places");
     let mut driven = 0;
     while mapping.steps().len() < places && (frames == 0 || driven < frames) {
         let Some((frame, truth)) = simulation.next() else { break };
@@ -44,11 +44,11 @@ pub(super) fn run(drive: &DriveArguments, rails: &OnRails, places: usize, frames
         journal.drive(&truth);
         if let Some(step) = mapping.observe(&frame, truth.turn.filter(|_| rails.hints == Hints::Turn)) {
             journal.detect(&step.place);
-            progress.suspend(|| println!("{step}"));
-            progress.inc(1);
+            progress.println(step);
+            progress.increment();
         }
     }
-    progress.finish_and_clear();
+    drop(progress);
     drive.summarise(&Summary {
         plan: &plan,
         truth: simulation.true_map(),

@@ -7,7 +7,7 @@ use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 use anyhow::Context;
 use clap::Args;
 use toposlam_link::line::{Line, open};
-use toposlam_link::log::Recorder;
+use toposlam_link::recording::Recorder;
 
 use super::interrupt::Interrupt;
 

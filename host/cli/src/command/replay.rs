@@ -7,11 +7,12 @@ use std::path::PathBuf;
 use anyhow::Context;
 use clap::Args;
 use toposlam::{Map, reference};
+use toposlam_eval::faults::fault_lines;
 use toposlam_eval::graph::Graph;
 use toposlam_eval::laps::{Laps, Named, Shape, Tolerance, Visit};
 use toposlam_eval::mapping::Mapping;
 use toposlam_eval::nearness::Nearness;
-use toposlam_eval::recording::{Ring, fault_lines};
+use toposlam_eval::range_csv::Ring;
 
 use super::filter::FilterArgument;
 
@@ -44,7 +45,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     let frames = ring.read(recording).with_context(|| format!("recording {}", arguments.recording.display()))?;
 
     // A smaller ring leaves slots of the frame without a sensor; they are dead in every frame.
-    let mut mapping = Mapping::start(ring.geometry(), arguments.filter.into())?;
+    let mut mapping = Mapping::of_recording(&ring, arguments.filter.into())?;
     for frame in &frames {
         if let Some(step) = mapping.observe(frame, None) {
             println!("{step}");

@@ -6,10 +6,11 @@ use anyhow::Context;
 use clap::Args;
 use toposlam::reference::SNAPSHOT_BYTES;
 use toposlam_cli::picture::{Drawing, Step, animate};
+use toposlam_cli::progress::Progress;
 use toposlam_sim::exploration::Exploration;
 use toposlam_sim::world::Detection;
 
-use super::drive::{DriveArguments, Summary, progress_bar};
+use super::drive::{DriveArguments, Summary};
 use super::rails::{self, OnRails};
 
 /// Arguments of `toposlam simulate`.
@@ -38,21 +39,21 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     let (plan, model) = drive.world()?;
     let mut buffer = [0; SNAPSHOT_BYTES];
     let mut exploration = Exploration::start(&plan, model, drive.seed(), &mut buffer)?;
-    let progress = progress_bar(*places)?;
+    let progress = Progress::new("", *places, "places");
     let (mut way, mut steps) = (Vec::new(), Vec::new());
     while exploration.places() < *places && (*frames == 0 || exploration.frames() < *frames) {
         if exploration.advance().is_some()
             && let Some(step) = exploration.steps().last()
         {
-            progress.suspend(|| println!("{step}"));
-            progress.inc(1);
+            progress.println(step);
+            progress.increment();
             if animation.is_some() {
                 steps.push(map_now(drive.plan(), &exploration, way.len()));
             }
         }
         way.push(exploration.rover().position());
     }
-    progress.finish_and_clear();
+    drop(progress);
     drive.summarise(&Summary::of(&plan, &exploration))?;
     if let Some(file) = animation {
         let picture = animate(&plan, &way, &steps);
