@@ -18,7 +18,7 @@
 //! ```
 
 use petgraph::graph::UnGraph;
-use toposlam::Map;
+use toposlam::{Map, VertexId};
 use toposlam::wire::{Picture, crc32};
 
 /// The vertices of a map and the edges between them.
@@ -91,11 +91,12 @@ impl<const V: usize> From<&Picture<V>> for TopologicalMap {
 
 impl<const V: usize> From<&Map<V>> for TopologicalMap {
     fn from(map: &Map<V>) -> Self {
-        let label = |(vertex, label): (u8, &toposlam::Fingerprint)| Vertex {
+        let label = |(vertex, label): (VertexId, &toposlam::Fingerprint)| Vertex {
             radius_mm: label.radius_mm(),
             visits: map.visits(vertex),
         };
-        Self { vertices: (0..).zip(map.labels()).map(label).collect(), edges: map.edges().collect() }
+        let edges = map.edges().map(|(a, b)| (a.into(), b.into()));
+        Self { vertices: map.vertices().zip(map.labels()).map(label).collect(), edges: edges.collect() }
     }
 }
 

@@ -28,7 +28,7 @@ pub use wheels::{DifferentialDrive, MotorError, Wheel, WheelSpeeds, WheelsConfig
 #[cfg(feature = "snapshot")]
 use crate::persist::snapshot::{Reader, Resume, SnapshotError, Writer};
 use crate::place::{Place, PlaceDetector};
-use crate::{FaultCounters, Filter, Turn, Update};
+use crate::{FaultCounters, Filter, Turn, Update, VertexId};
 use navigator::Navigator;
 use pilot::Pilot;
 
@@ -114,7 +114,7 @@ impl<const V: usize, const HISTORY: usize> Drive<V, HISTORY> {
     }
 
     /// Whether the best map has a way from where the robot is to a vertex.
-    pub fn leads_to(&self, filter: &impl Filter<V>, vertex: u8) -> bool {
+    pub fn leads_to(&self, filter: &impl Filter<V>, vertex: VertexId) -> bool {
         navigator::leads_to(filter, vertex)
     }
 

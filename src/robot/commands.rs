@@ -1,7 +1,7 @@
 //! What the robot does when it is told something.
 
 use super::{Board, Line, RECEIVED_PER_TURN, Robot, restore, snapshot};
-use crate::FaultKind;
+use crate::{FaultKind, VertexId};
 use crate::drive::{self, Goal};
 use crate::persist::snapshot::Resume;
 use crate::wire::{Command, Info, Journey, JourneyState, Message, Outcome, Refusal, Setting, Settings, Version};
@@ -56,7 +56,7 @@ impl<const SONARS: usize, const N: usize, const V: usize, const HISTORY: usize> 
 
     fn info(&self, board: &mut impl Board) -> Info {
         let going_to = match (self.drive.goal(), self.drive.journey()) {
-            (Goal::Vertex(vertex), drive::Journey::Underway) => Some(vertex),
+            (Goal::Vertex(vertex), drive::Journey::Underway) => Some(vertex.into()),
             _ => None,
         };
         Info {
@@ -115,9 +115,8 @@ impl<const SONARS: usize, const N: usize, const V: usize, const HISTORY: usize> 
     }
 
     fn go_to(&mut self, vertex: u8, board: &mut impl Board) -> Result<(), Refusal> {
-        if vertex >= self.mapper.map().vertices() {
-            return Err(Refusal::UnknownVertex);
-        }
+        let known = VertexId::new(vertex).filter(|&vertex| self.mapper.map().contains(vertex));
+        let vertex = known.ok_or(Refusal::UnknownVertex)?;
         if !self.drive.leads_to(self.mapper.filter(), vertex) {
             return Err(Refusal::NoRoute);
         }
@@ -127,7 +126,7 @@ impl<const SONARS: usize, const N: usize, const V: usize, const HISTORY: usize> 
 
     fn set_goal(&mut self, goal: Goal, board: &mut impl Board) {
         if let (Goal::Vertex(vertex), drive::Journey::Underway) = self.told {
-            let _ = self.send(&Message::Journey(Journey { vertex, state: JourneyState::Replaced }), board);
+            let _ = self.send(&Message::Journey(Journey { vertex: vertex.into(), state: JourneyState::Replaced }), board);
         }
         self.told = NOTHING;
         self.drive.set_goal(goal);
@@ -144,7 +143,8 @@ impl<const SONARS: usize, const N: usize, const V: usize, const HISTORY: usize> 
             drive::Journey::VertexGone => JourneyState::VertexGone,
             drive::Journey::TooLong => JourneyState::Lost,
         };
-        if self.told != now && self.send(&Message::Journey(Journey { vertex, state }), board).is_ok() {
+        let journey = Journey { vertex: vertex.into(), state };
+        if self.told != now && self.send(&Message::Journey(journey), board).is_ok() {
             self.told = now;
         }
     }

@@ -9,7 +9,7 @@ use super::{
     trial::{Trial, Truth},
 };
 use std::time::{Duration, Instant};
-use toposlam::{Consistency, Direction, Evidence, History, Map, NgramLength};
+use toposlam::{Consistency, Direction, Evidence, History, Map, NgramLength, VertexId};
 
 /// Whether a map is exact is looked at after every so many places, and at the check points.
 pub const EXACT_EVERY: usize = 10;
@@ -110,7 +110,7 @@ fn leaves_truth(candidate: &dyn Candidate, truth: &Truth, before: usize, slices:
     }
     // The filter numbers vertices by first visit.
     let mut seen = Vec::new();
-    let path: Vec<u8> = truth
+    let path: Vec<VertexId> = truth
         .classes
         .iter()
         .map(|class| {
@@ -118,16 +118,16 @@ fn leaves_truth(candidate: &dyn Candidate, truth: &Truth, before: usize, slices:
                 seen.push(*class);
                 seen.len() - 1
             });
-            u8::try_from(number).unwrap_or(u8::MAX)
+            VertexId::new(u8::try_from(number).ok()?)
         })
-        .collect();
+        .collect::<Option<_>>()?;
     let (map, path) = candidate.search_from(&path, slices)?;
     Some(!score_map_from(&graph_of(&map), &path, &truth.graph, &truth.classes, before).exact)
 }
 
 fn graph_of(map: &Map<VERTICES>) -> Graph {
     let edges = map.edges().map(|(a, b)| (usize::from(a), usize::from(b)));
-    Graph::from_edges(usize::from(map.vertices()), edges)
+    Graph::from_edges(map.vertices().len(), edges)
 }
 
 /// The distance of a map after so many places of the path, in millimetres.

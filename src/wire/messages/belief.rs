@@ -4,9 +4,8 @@
 use serde::{Deserialize, Serialize};
 
 use super::List;
-use crate::Filter;
-use crate::map::bits;
 use crate::wire::robot::bit;
+use crate::{Filter, VertexId, VertexSet};
 
 /// Where the robot may be, and how far the map itself is to be trusted.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -32,8 +31,8 @@ impl Belief {
     /// What a filter believes after a place.
     pub fn of<const V: usize>(filter: &impl Filter<V>, place_index: u32) -> Self {
         let mut places = [PlaceProbability::default(); 8];
-        for vertex in 0..filter.map().vertices() {
-            let mut place = PlaceProbability { vertex, permille: permille(filter.place_probability_q16(vertex)) };
+        for vertex in filter.map().vertices() {
+            let mut place = PlaceProbability { vertex: vertex.into(), permille: permille(filter.place_probability_q16(vertex)) };
             for slot in &mut places {
                 if place.permille > slot.permille {
                     core::mem::swap(slot, &mut place);
@@ -79,8 +78,10 @@ impl Renamed {
 
     /// What the last update of a filter did to the numbers of the first so many vertices; `None` when all kept theirs.
     pub fn of<const V: usize>(filter: &impl Filter<V>, vertices: u8, place_index: u32) -> Option<Self> {
-        let kept = (0..vertices).rev().find(|&vertex| filter.renamed(vertex) != Some(vertex))?;
-        let names = (0..=kept).map(|vertex| filter.renamed(vertex).unwrap_or(Self::GONE));
+        let before = VertexId::first(vertices.into());
+        let last = before.rev().find(|&vertex| filter.renamed(vertex) != Some(vertex))?;
+        let now = |vertex| filter.renamed(vertex).map_or(Self::GONE, u8::from);
+        let names = VertexId::first(last.index() + 1).map(now);
         Some(Self { place_index, names: List::new(names) })
     }
 
@@ -108,7 +109,7 @@ impl Renamed {
         for ((before, label), row) in (0..).zip(labels_before).zip(neighbours_before) {
             let Some(now) = self.now(before) else { continue };
             let Some(slot) = neighbours.get_mut(usize::from(now)) else { continue };
-            let neighbours_now = bits(row).filter_map(|other| self.now(other)).filter(|&now| usize::from(now) < V);
+            let neighbours_now = VertexSet::from_bits(row).iter().filter_map(|other| self.now(other.into())).filter(|&now| usize::from(now) < V);
             *slot |= neighbours_now.fold(0, |row, other| row | bit(other));
             if labelled & bit(before) != 0
                 && labelled_now & bit(now) == 0
@@ -144,7 +145,7 @@ impl Worst {
     /// What the map of a filter explains worst after a place.
     pub fn of<const V: usize>(filter: &impl Filter<V>, place_index: u32) -> Self {
         let worst = filter.worst();
-        let vertices = List::new(worst.walk().iter().copied());
+        let vertices = List::new(worst.walk().iter().map(|&vertex| vertex.into()));
         Self { place_index, distance_mm: worst.distance_mm, newest_age: worst.newest_age, vertices }
     }
 

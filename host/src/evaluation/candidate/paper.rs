@@ -55,7 +55,7 @@ impl<const N: usize, const WORDS: usize> Particles<N, WORDS> {
 
     fn advance(&mut self) {
         let particles = self.filter.particles().iter();
-        self.ancestry.advance(particles.map(|particle| (particle.parent.into(), particle.place.into())));
+        self.ancestry.advance(particles.map(|particle| (particle.parent.into(), particle.at.into())));
     }
 
     /// The newest vertices that the best particle visited.
