@@ -259,7 +259,7 @@ class FaultKind(enum.IntEnum):
     """What a robot counts that went wrong."""
 
     SONAR_SILENT = 0
-    SONAR_NONSENSE = 1
+    SONAR_OUT_OF_RANGE = 1
     BUS_ERROR = 2
     RING_BLIND = 3
     RADIUS_OUT_OF_RANGE = 4

@@ -27,7 +27,7 @@ macro_rules! texts {
 
 texts!(FaultKind {
     SonarSilent => "SonarSilent",
-    SonarNonsense => "SonarNonsense",
+    SonarOutOfRange => "SonarOutOfRange",
     BusError => "BusError",
     RingBlind => "RingBlind",
     RadiusOutOfRange => "RadiusOutOfRange",
@@ -64,7 +64,7 @@ texts!(PlaceConfigError {
 
 texts!(SonarFault {
     Silent => "did not answer in time",
-    Nonsense => "answered with an impossible range",
+    OutOfRange => "answered with an impossible range",
     Bus => "could not be reached: bus or pin error",
     Stuck => "holds its line high before it is asked",
     Clock => "could not be timed: the clock stands still",
@@ -182,8 +182,8 @@ impl Format for WeightFactors {
 
 impl Format for FaultCounters {
     fn format(&self, f: Formatter<'_>) {
-        for kind in FaultKind::ALL.into_iter().filter(|kind| self.of(*kind) > 0) {
-            write!(f, "{} {=u32} ", kind, self.of(kind));
+        for kind in FaultKind::ALL.into_iter().filter(|kind| self.count(*kind) > 0) {
+            write!(f, "{} {=u32} ", kind, self.count(kind));
         }
     }
 }

@@ -4,10 +4,10 @@
 //! use toposlam::{FaultCounters, FaultKind};
 //!
 //! let (mut ring, mut filter) = (FaultCounters::new(), FaultCounters::new());
-//! ring.count(FaultKind::SonarSilent);
-//! filter.count(FaultKind::VerticesFull);
+//! ring.record(FaultKind::SonarSilent);
+//! filter.record(FaultKind::VerticesFull);
 //! ring.add(&filter);
-//! assert_eq!((ring.of(FaultKind::VerticesFull), ring.of(FaultKind::BusError)), (1, 0));
+//! assert_eq!((ring.count(FaultKind::VerticesFull), ring.count(FaultKind::BusError)), (1, 0));
 //! ```
 
 /// A kind of fault. Faults are counted and reported; none of them ends the mapping or loses a map.
@@ -18,7 +18,7 @@ pub enum FaultKind {
     /// A sonar did not answer in time.
     SonarSilent = 0,
     /// A sonar answered with a value outside what its data sheet allows.
-    SonarNonsense = 1,
+    SonarOutOfRange = 1,
     /// The sensor bus reported an error in the middle of a frame.
     BusError = 2,
     /// A ring frame had too few live sensors to look for a place.
@@ -53,7 +53,7 @@ impl FaultKind {
     /// Every kind, in the order of its number.
     pub const ALL: [Self; 16] = [
         Self::SonarSilent,
-        Self::SonarNonsense,
+        Self::SonarOutOfRange,
         Self::BusError,
         Self::RingBlind,
         Self::RadiusOutOfRange,
@@ -83,15 +83,15 @@ impl FaultCounters {
         Self { counts: [0; FaultKind::ALL.len()] }
     }
 
-    /// Counts one more fault of a kind.
-    pub fn count(&mut self, kind: FaultKind) {
+    /// Records one fault of this kind.
+    pub fn record(&mut self, kind: FaultKind) {
         if let Some(count) = self.counts.get_mut(kind as usize) {
             *count = count.saturating_add(1);
         }
     }
 
-    /// How often a kind was seen.
-    pub fn of(&self, kind: FaultKind) -> u32 {
+    /// Returns how many faults of this kind were recorded since the start; saturates at `u32::MAX`.
+    pub fn count(&self, kind: FaultKind) -> u32 {
         self.counts.get(kind as usize).copied().unwrap_or(0)
     }
 
@@ -123,11 +123,11 @@ mod tests {
     #[test]
     fn counts_saturate_and_add_up() {
         let mut counters = FaultCounters::new();
-        counters.count(FaultKind::BusError);
+        counters.record(FaultKind::BusError);
         let mut sum = FaultCounters { counts: [u32::MAX; FaultKind::ALL.len()] };
         sum.add(&counters);
-        assert_eq!(sum.of(FaultKind::BusError), u32::MAX);
-        assert_eq!(counters.of(FaultKind::BusError), 1);
-        assert_eq!(counters.of(FaultKind::WireFull), 0);
+        assert_eq!(sum.count(FaultKind::BusError), u32::MAX);
+        assert_eq!(counters.count(FaultKind::BusError), 1);
+        assert_eq!(counters.count(FaultKind::WireFull), 0);
     }
 }

@@ -164,13 +164,13 @@ impl<const SONARS: usize, const V: usize, F: Filter<V>> Mapper<SONARS, V, F> {
     }
 
     /// The robot was carried, or its drive has lost its way: the next place need not be a neighbour of the last one.
-    pub fn carried(&mut self) {
+    pub fn kidnapped(&mut self) {
         self.begins = true;
     }
 
-    /// The robot has not moved from the place that was reported last; see [`PlaceDetector::stay`].
-    pub fn stay(&mut self) {
-        self.detector.stay();
+    /// The robot has not moved from the place that was reported last; see [`PlaceDetector::hold_place`].
+    pub fn hold_place(&mut self) {
+        self.detector.hold_place();
     }
 
     /// Writes a whole snapshot into a buffer and tells its length. It has as many hypotheses as there is room for; the map that

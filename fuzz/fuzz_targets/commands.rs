@@ -219,9 +219,9 @@ impl<'buffer> Robot<'buffer> {
         self.inbox = inbox;
         self.expected.judge(due, executed, reply.map(|reply| (reply.request, reply.outcome)));
         let faults = self.inbox.faults();
-        assert_eq!(faults.of(FaultKind::WireCorrupt), self.expected.corrupt);
-        assert_eq!(faults.of(FaultKind::CommandFlood), self.expected.flood);
-        assert_eq!(faults.of(FaultKind::CommandRefused), self.expected.refused);
+        assert_eq!(faults.count(FaultKind::WireCorrupt), self.expected.corrupt);
+        assert_eq!(faults.count(FaultKind::CommandFlood), self.expected.flood);
+        assert_eq!(faults.count(FaultKind::CommandRefused), self.expected.refused);
         if !self.paused && self.turns.is_multiple_of(TURNS_PER_PLACE) {
             let update = self.filter.observe(filters::walk(PLACES + self.turns / TURNS_PER_PLACE));
             filters::check(&self.filter, &update);

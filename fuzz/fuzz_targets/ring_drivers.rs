@@ -198,7 +198,7 @@ fn check_frame(ring: &mut impl SonarRing<SONARS>, nearest_mm: u16, farthest_mm: 
     for range_mm in frame.echoes.iter().filter_map(|echo| echo.range_mm()) {
         assert!((nearest_mm..=farthest_mm).contains(&range_mm), "{range_mm} mm");
     }
-    let counted: u32 = FaultKind::ALL.into_iter().map(|kind| faults.of(kind)).sum();
+    let counted: u32 = FaultKind::ALL.into_iter().map(|kind| faults.count(kind)).sum();
     assert_eq!(counted as usize, frame.dead_sensors().count());
     let last = frame.dead_sensors().last();
     assert_eq!(ring.last_error().map(|error| usize::from(error.sensor)), last);

@@ -26,7 +26,7 @@ fn drive(plan: &str, model: RobotModel, seed: u64, visits: usize) -> (Report, Ve
             journal.detect(&place);
         }
     }
-    assert_eq!(detector.faults().of(FaultKind::RingBlind), 0);
+    assert_eq!(detector.faults().count(FaultKind::RingBlind), 0);
     (journal.report(), journal.detections().iter().map(|detection| detection.place).collect())
 }
 
@@ -122,7 +122,7 @@ fn the_real_recording_gives_places_whose_radius_fits_its_room() {
     // Six laps along the walls of one room, 5 m at most across its free parts.
     assert!((6..=30).contains(&places.len()), "{places:?}");
     assert!(places.iter().all(|place| (300..2500).contains(&place.fingerprint.radius_mm())), "{places:?}");
-    assert_eq!(detector.faults().of(FaultKind::RingBlind), 0);
+    assert_eq!(detector.faults().count(FaultKind::RingBlind), 0);
 }
 
 fn any_echo() -> impl Strategy<Value = Echo> {

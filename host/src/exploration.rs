@@ -17,7 +17,7 @@
 
 use std::collections::VecDeque;
 
-use toposlam::drive::{Goal, Suggestion};
+use toposlam::drive::{Goal, VelocityCommand};
 use toposlam::place::Place;
 use toposlam::reference::{ROBOT, ReferenceRobot, SONARS};
 use toposlam::ring::RingFrame;
@@ -41,7 +41,7 @@ pub struct MemoryBoard {
     /// Bytes that the robot has sent.
     pub sent: Vec<u8>,
     /// Where the wheels are set to go.
-    pub suggestion: Suggestion,
+    pub velocity: VelocityCommand,
     /// The time since the start.
     pub now_ms: u32,
     /// The newest snapshot.
@@ -60,8 +60,8 @@ impl Board for MemoryBoard {
         Ok(())
     }
 
-    fn follow(&mut self, suggestion: Suggestion) {
-        self.suggestion = suggestion;
+    fn follow(&mut self, velocity: VelocityCommand) {
+        self.velocity = velocity;
     }
 
     fn feed_watchdog(&mut self) {
@@ -163,8 +163,8 @@ impl<'buffer> Exploration<'buffer> {
     }
 
     /// Drives on as far as until the next frame.
-    pub fn drive(&mut self, suggestion: Suggestion) {
-        self.rover.follow(suggestion);
+    pub fn drive(&mut self, velocity: VelocityCommand) {
+        self.rover.follow(velocity);
     }
 
     /// All of it: a frame, a turn of the robot's main loop, and the way to the next frame. What the robot says meanwhile is
@@ -179,7 +179,7 @@ impl<'buffer> Exploration<'buffer> {
             self.board.received.extend(line.noise());
         }
         let seen = self.map(&frame);
-        self.drive(self.board.suggestion);
+        self.drive(self.board.velocity);
         seen
     }
 
@@ -196,7 +196,7 @@ impl<'buffer> Exploration<'buffer> {
     /// Whether the robot was told to go to a vertex and is not there yet.
     pub fn is_underway(&self) -> bool {
         let drive = self.robot.drive();
-        matches!(drive.goal(), Goal::Vertex(_)) && drive.journey() == toposlam::drive::Journey::Underway
+        matches!(drive.goal(), Goal::Vertex(_)) && drive.goal_status() == toposlam::drive::GoalStatus::Active
     }
 
     /// The robot.
@@ -256,7 +256,7 @@ impl<'buffer> Exploration<'buffer> {
 
     /// How often the drive lost its way.
     pub fn times_lost(&self) -> u32 {
-        self.robot.drive().faults().of(FaultKind::DriveLost)
+        self.robot.drive().faults().count(FaultKind::DriveLost)
     }
 
     /// The vertex that the best map takes each place for; `None` for a place that the history has forgotten.

@@ -147,8 +147,8 @@ impl Ring {
 
 /// One line for each kind of fault that was seen.
 pub fn fault_lines(faults: &FaultCounters) -> Vec<String> {
-    let seen = FaultKind::ALL.into_iter().filter(|kind| faults.of(*kind) > 0);
-    seen.map(|kind| format!("{kind:?}: {}", faults.of(kind))).collect()
+    let seen = FaultKind::ALL.into_iter().filter(|kind| faults.count(*kind) > 0);
+    seen.map(|kind| format!("{kind:?}: {}", faults.count(kind))).collect()
 }
 
 #[cfg(test)]

@@ -18,8 +18,8 @@
 //! ```
 
 use petgraph::graph::UnGraph;
-use toposlam::{Map, VertexId};
 use toposlam::wire::{Picture, crc32};
+use toposlam::{Map, VertexId};
 
 /// The vertices of a map and the edges between them.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Hash)]

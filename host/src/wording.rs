@@ -9,7 +9,7 @@
 //! ```
 
 use toposlam::FaultKind;
-use toposlam::drive::PilotState;
+use toposlam::drive::DriveState;
 use toposlam::ring::Echo;
 use toposlam::wire::{
     Arrival, Belief, Drive, Evidence, Health, Hello, Info, Journey, Message, Outcome, Renamed, Row, Worst,
@@ -106,14 +106,14 @@ pub fn fault_name(kind: u8) -> String {
 
 /// What the drive is doing, by its number.
 pub fn drive_state(state: u8) -> &'static str {
-    const STATES: [(PilotState, &str); 7] = [
-        (PilotState::Follow, "follows an edge"),
-        (PilotState::Home, "homes in on a place"),
-        (PilotState::Look, "looks for the ways out"),
-        (PilotState::Face, "turns to its way"),
-        (PilotState::Leave, "leaves a place"),
-        (PilotState::Stand, "stands"),
-        (PilotState::Escape, "turns to where there is room"),
+    const STATES: [(DriveState, &str); 7] = [
+        (DriveState::FollowEdge, "follows an edge"),
+        (DriveState::Approach, "homes in on a place"),
+        (DriveState::ChooseExit, "looks for the ways out"),
+        (DriveState::TurnToExit, "turns to its way"),
+        (DriveState::Depart, "leaves a place"),
+        (DriveState::Stopped, "stands"),
+        (DriveState::Recover, "turns to where there is room"),
     ];
     STATES.iter().find(|&&(known, _)| known as u8 == state).map_or("does something unknown here", |&(_, text)| text)
 }
@@ -259,7 +259,7 @@ mod tests {
     fn kinds_that_are_not_known_here_are_numbers() {
         assert_eq!(message(&Message::Fault { kind: 14, count: 2 }), "fault DriveLost: 2 times");
         assert_eq!(message(&Message::Fault { kind: 200, count: 2 }), "fault kind 200: 2 times");
-        assert_eq!(drive_state(PilotState::Home as u8), "homes in on a place");
+        assert_eq!(drive_state(DriveState::Approach as u8), "homes in on a place");
         assert_eq!(drive_state(99), "does something unknown here");
     }
 }

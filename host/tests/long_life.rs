@@ -1,7 +1,7 @@
 //! A robot lives for hours in a simulated building, with faults of every kind and an operator who never leaves it alone.
 
 use toposlam::FaultKind;
-use toposlam::drive::Suggestion;
+use toposlam::drive::VelocityCommand;
 use toposlam::reference::SNAPSHOT_BYTES;
 use toposlam::ring::{Echo, RingFrame};
 use toposlam_host::exploration::Exploration;
@@ -30,7 +30,7 @@ fn with_faults_no_turn_and_no_place_is_lost_and_every_fault_is_counted() {
     assert!(to_robot.dropped_bytes > 0 && to_robot.flipped_bits > 0 && from_robot.dropped_bytes > 0);
     assert!(life.operator.restored >= HOURS && life.operator.repeated > 0 && life.kept > 0);
     let counted = [FaultKind::RingBlind, FaultKind::WireCorrupt, FaultKind::CommandFlood, FaultKind::CommandRefused];
-    assert!(counted.into_iter().all(|kind| life.faults.of(kind) > 0), "{:?}", life.faults);
+    assert!(counted.into_iter().all(|kind| life.faults.count(kind) > 0), "{:?}", life.faults);
 }
 
 #[test]
@@ -61,13 +61,13 @@ fn a_robot_that_hears_nothing_stands_and_goes_on_when_it_hears_again() {
     let plan = Plan::built_in("office").unwrap();
     let mut buffer = [0; SNAPSHOT_BYTES];
     let mut exploration = Exploration::start(&plan, RobotModel::default(), 1, &mut buffer).unwrap();
-    while exploration.board().suggestion.speed_permille < 900 {
+    while exploration.board().velocity.speed_permille < 900 {
         exploration.advance();
     }
     for _ in 0..100 {
         exploration.map(&RingFrame { echoes: [Echo::Dead; 16] });
-        assert_eq!(exploration.board().suggestion, Suggestion::STAND);
+        assert_eq!(exploration.board().velocity, VelocityCommand::STOP);
     }
     exploration.advance();
-    assert!(exploration.board().suggestion.speed_permille > 0);
+    assert!(exploration.board().velocity.speed_permille > 0);
 }

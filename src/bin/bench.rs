@@ -23,7 +23,7 @@ use defmt_rtt as _;
 use static_cell::ConstStaticCell;
 use toposlam::{
     FaultCounters, Filter as _, Fingerprint, Observation, RobustConfig, RobustFilter, Turn, Update,
-    drive::{Drive, Suggestion},
+    drive::{Drive, VelocityCommand},
     persist::snapshot::Writer,
     reference::{
         self, Detector, Filter, HISTORY, PaperReference, ReferenceRobot, RobotMapper, SNAPSHOT_BYTES, SONARS, VERTICES,
@@ -253,8 +253,8 @@ impl Board for Bare {
         Ok(())
     }
 
-    fn follow(&mut self, suggestion: Suggestion) {
-        black_box(suggestion);
+    fn follow(&mut self, velocity: VelocityCommand) {
+        black_box(velocity);
     }
 
     fn feed_watchdog(&mut self) {}

@@ -29,7 +29,7 @@ use stm32f4xx_hal::{
 };
 use toposlam::{
     FaultCounters, MapperConfig,
-    drive::{DifferentialDrive, Suggestion, WheelsConfig},
+    drive::{DifferentialDrive, VelocityCommand, WheelsConfig},
     persist::store::{BootPolicy, Store},
     reference::{MAPPER, ROBOT, ReferenceRobot, SNAPSHOT_BYTES, SONARS, STORE},
     ring::drivers::{Sc18im700, SonarRing, Srf08Config, Srf08Ring},
@@ -65,9 +65,9 @@ impl Board for Stm32f405<'_> {
         self.line.try_borrow_mut().map_err(|_| QueueFull)?.send(frame)
     }
 
-    fn follow(&mut self, suggestion: Suggestion) {
+    fn follow(&mut self, velocity: VelocityCommand) {
         // Neither the timer nor the pins of this chip can refuse.
-        let _ = self.wheels.follow(suggestion);
+        let _ = self.wheels.follow(velocity);
     }
 
     fn feed_watchdog(&mut self) {

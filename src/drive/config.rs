@@ -13,21 +13,26 @@ pub struct DriveConfig {
     /// follows bends and noise more closely.
     pub look_ahead_mm: u16,
     /// A meet point has been reached when it is this near, in millimetres. Default 40.
-    pub arrive_mm: u16,
+    pub arrival_tolerance_mm: u16,
     /// The robot backs away from anything straight ahead that is this near, in millimetres. Default 250.
     pub clearance_mm: u16,
     /// The pilot gives up what it is at, and looks for the graph anew, after so many ring frames without success, at
     /// least 1. Default 100.
-    pub patience_frames: u16,
+    pub timeout_frames: u16,
 }
 
 impl DriveConfig {
     /// The documented defaults.
-    pub const DEFAULT: Self =
-        Self { speed_permille: 1000, look_ahead_mm: 400, arrive_mm: 40, clearance_mm: 250, patience_frames: 100 };
+    pub const DEFAULT: Self = Self {
+        speed_permille: 1000,
+        look_ahead_mm: 400,
+        arrival_tolerance_mm: 40,
+        clearance_mm: 250,
+        timeout_frames: 100,
+    };
 
     pub(crate) const UNSET: Self =
-        Self { speed_permille: 0, look_ahead_mm: 0, arrive_mm: 0, clearance_mm: 0, patience_frames: 0 };
+        Self { speed_permille: 0, look_ahead_mm: 0, arrival_tolerance_mm: 0, clearance_mm: 0, timeout_frames: 0 };
 
     /// Whether every field is in its range.
     pub(super) const fn check(&self) -> Result<(), DriveConfigError> {
@@ -37,8 +42,8 @@ impl DriveConfig {
         if self.look_ahead_mm == 0 {
             return Err(DriveConfigError::LookAheadMm);
         }
-        if self.patience_frames == 0 {
-            return Err(DriveConfigError::PatienceFrames);
+        if self.timeout_frames == 0 {
+            return Err(DriveConfigError::TimeoutFrames);
         }
         Ok(())
     }
@@ -58,8 +63,8 @@ pub enum DriveConfigError {
     SpeedPermille,
     /// `look_ahead_mm`: 0.
     LookAheadMm,
-    /// `patience_frames`: 0.
-    PatienceFrames,
+    /// `timeout_frames`: 0.
+    TimeoutFrames,
 }
 
 impl fmt::Display for DriveConfigError {
@@ -67,7 +72,7 @@ impl fmt::Display for DriveConfigError {
         f.write_str(match self {
             Self::SpeedPermille => "speed_permille: must be from 1 to 1000",
             Self::LookAheadMm => "look_ahead_mm: must not be 0",
-            Self::PatienceFrames => "patience_frames: must not be 0",
+            Self::TimeoutFrames => "timeout_frames: must not be 0",
         })
     }
 }
@@ -86,7 +91,7 @@ mod tests {
             (DriveConfig { speed_permille: 0, ..good }, DriveConfigError::SpeedPermille),
             (DriveConfig { speed_permille: 1001, ..good }, DriveConfigError::SpeedPermille),
             (DriveConfig { look_ahead_mm: 0, ..good }, DriveConfigError::LookAheadMm),
-            (DriveConfig { patience_frames: 0, ..good }, DriveConfigError::PatienceFrames),
+            (DriveConfig { timeout_frames: 0, ..good }, DriveConfigError::TimeoutFrames),
         ];
         for (config, error) in wrong {
             assert_eq!(config.check(), Err(error));

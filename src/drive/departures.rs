@@ -2,9 +2,9 @@
 
 use super::pilot::WaysOut;
 use crate::map::PerVertex;
-use crate::{Filter, VertexId};
 #[cfg(feature = "snapshot")]
 use crate::persist::snapshot::{Reader, SnapshotError, Writer};
+use crate::{Filter, VertexId};
 
 /// A place has at most so many ways; the seventh and eighth have no room in the note of a place.
 pub(super) const WAYS: usize = 7;

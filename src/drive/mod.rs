@@ -1,7 +1,7 @@
 //! The drive: ring frames in, a heading and a speed out, along the generalised Voronoi graph and from place to place.
 //!
 //! ```text
-//! PlaceDetector ─ smoothed ring ─▶ Pilot ─ Suggestion ─▶ wheels
+//! PlaceDetector ─ smoothed ring ─▶ Pilot ─ VelocityCommand ─▶ wheels
 //! Filter ─ best map, belief ─▶ Navigator ─ which way ─▶ Pilot
 //!                                  ▲ turn hint, back to the filter
 //! ```
@@ -21,8 +21,8 @@ mod turning;
 mod wheels;
 
 pub use config::{DriveConfig, DriveConfigError};
-pub use navigator::{Goal, Journey};
-pub use pilot::PilotState;
+pub use navigator::{Goal, GoalStatus};
+pub use pilot::DriveState;
 pub use wheels::{DifferentialDrive, MotorError, Wheel, WheelSpeeds, WheelsConfig, WheelsConfigError};
 
 #[cfg(feature = "snapshot")]
@@ -34,16 +34,16 @@ use pilot::Pilot;
 
 /// Where to go until the next ring frame.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Suggestion {
+pub struct VelocityCommand {
     /// The direction to drive in, in milliradians, counter-clockwise from where the first bearing of the ring's geometry is 0.
     pub heading_mrad: i16,
     /// How fast, in thousandths of the robot's full speed; 0 to turn on the spot, or to stand when the heading is 0 as well.
     pub speed_permille: u16,
 }
 
-impl Suggestion {
+impl VelocityCommand {
     /// Stand still.
-    pub const STAND: Self = Self { heading_mrad: 0, speed_permille: 0 };
+    pub const STOP: Self = Self { heading_mrad: 0, speed_permille: 0 };
 }
 
 /// The drive of a robot whose maps have at most `V` vertices and whose filter remembers `HISTORY` places.
@@ -82,16 +82,16 @@ impl<const V: usize, const HISTORY: usize> Drive<V, HISTORY> {
         detector: &PlaceDetector<SONARS>,
         filter: &F,
         seen: Option<(&Place, &Update)>,
-    ) -> Suggestion {
+    ) -> VelocityCommand {
         if let Some((place, update)) = seen {
             self.navigator.arrive(filter, update);
             self.pilot.arrive(place.degree);
         }
         if detector.is_blind() {
-            return Suggestion::STAND;
+            return VelocityCommand::STOP;
         }
         let navigator = &mut self.navigator;
-        self.pilot.advance(&detector.scan(), detector.is_leaving(), |ways| navigator.choose(filter, ways))
+        self.pilot.advance(&detector.scan(), detector.is_at_place(), |ways| navigator.choose(filter, ways))
     }
 
     /// How the robot left the place before the one it may be at, if it knows: the hint for the filter.
@@ -124,22 +124,22 @@ impl<const V: usize, const HISTORY: usize> Drive<V, HISTORY> {
     }
 
     /// How the way to the last goal went.
-    pub const fn journey(&self) -> Journey {
-        self.navigator.journey()
+    pub const fn goal_status(&self) -> GoalStatus {
+        self.navigator.goal_status()
     }
 
     /// What the pilot does.
-    pub const fn state(&self) -> PilotState {
+    pub const fn state(&self) -> DriveState {
         self.pilot.state()
     }
 
-    /// Whether the robot has not left the place that was reported last: [`PlaceDetector::stay`] is for it.
-    pub const fn is_at_place(&self) -> bool {
-        self.pilot.is_at_place()
+    /// Whether the robot has not left the place that was reported last: [`PlaceDetector::hold_place`] is for it.
+    pub const fn holds_place(&self) -> bool {
+        self.pilot.holds_place()
     }
 
     /// The robot was, or may have been, carried: what it did at the newest place led nowhere.
-    pub fn carried(&mut self) {
+    pub fn kidnapped(&mut self) {
         self.navigator.forget_departure();
         self.pilot.lose_way();
     }
@@ -171,7 +171,7 @@ impl<const V: usize, const HISTORY: usize> Drive<V, HISTORY> {
         self.navigator.restore(section)?;
         match resume {
             Resume::InPlace => self.pilot.lose_way(),
-            Resume::Elsewhere => self.carried(),
+            Resume::Elsewhere => self.kidnapped(),
         }
         Ok(())
     }

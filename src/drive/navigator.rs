@@ -5,9 +5,9 @@ use rand_core::Rng;
 use super::departures::{Departures, WAYS, Way};
 use super::pilot::WaysOut;
 use crate::filter::draws;
+use crate::map::PerVertex;
 #[cfg(feature = "snapshot")]
 use crate::persist::snapshot::{Reader, SnapshotError, Writer};
-use crate::map::PerVertex;
 use crate::{Filter, Update, VertexId, VertexSet};
 
 /// A robot is at a vertex when the filter believes so with at least this probability, in units of 2⁻¹⁶.
@@ -22,23 +22,23 @@ pub enum Goal {
     /// Drive to this vertex of the best map and stand there.
     Vertex(VertexId),
     /// Stand at the next place.
-    Stand,
+    Stop,
 }
 
 /// How the way to a vertex goes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
-pub enum Journey {
+pub enum GoalStatus {
     /// None was asked for.
-    None,
+    Inactive,
     /// The robot is on its way.
-    Underway,
+    Active,
     /// The robot stands at the vertex: the filter believes so.
-    Arrived,
+    Reached,
     /// The vertex is not part of the best map any more.
-    VertexGone,
+    VertexRemoved,
     /// After many more places than the map has vertices the robot is not there.
-    TooLong,
+    TimedOut,
 }
 
 /// Decides at places; remembers one byte for each of `HISTORY` places.
@@ -46,7 +46,7 @@ pub enum Journey {
 pub(super) struct Navigator<const V: usize, const HISTORY: usize> {
     seed: u64,
     goal: Goal,
-    journey: Journey,
+    goal_status: GoalStatus,
     /// Places since the goal was set.
     places: u16,
     /// How many decisions were made.
@@ -59,7 +59,7 @@ impl<const V: usize, const HISTORY: usize> Navigator<V, HISTORY> {
         Self {
             seed: 0,
             goal: Goal::Explore,
-            journey: Journey::None,
+            goal_status: GoalStatus::Inactive,
             places: 0,
             decisions: 0,
             departures: Departures::new(),
@@ -69,7 +69,7 @@ impl<const V: usize, const HISTORY: usize> Navigator<V, HISTORY> {
     pub(super) fn start(&mut self, seed: u64) {
         self.seed = seed;
         self.goal = Goal::Explore;
-        self.journey = Journey::None;
+        self.goal_status = GoalStatus::Inactive;
         self.places = 0;
         self.decisions = 0;
         self.departures.clear();
@@ -78,15 +78,15 @@ impl<const V: usize, const HISTORY: usize> Navigator<V, HISTORY> {
     pub(super) fn set_goal(&mut self, goal: Goal) {
         self.goal = goal;
         self.places = 0;
-        self.journey = if matches!(goal, Goal::Vertex(_)) { Journey::Underway } else { Journey::None };
+        self.goal_status = if matches!(goal, Goal::Vertex(_)) { GoalStatus::Active } else { GoalStatus::Inactive };
     }
 
     pub(super) const fn goal(&self) -> Goal {
         self.goal
     }
 
-    pub(super) const fn journey(&self) -> Journey {
-        self.journey
+    pub(super) const fn goal_status(&self) -> GoalStatus {
+        self.goal_status
     }
 
     pub(super) fn forget_departure(&mut self) {
@@ -115,10 +115,10 @@ impl<const V: usize, const HISTORY: usize> Navigator<V, HISTORY> {
     pub(super) fn arrive(&mut self, filter: &impl Filter<V>, _update: &Update) {
         self.departures.arrive();
         self.places = self.places.saturating_add(1);
-        if let (Goal::Vertex(target), Journey::Underway) = (self.goal, self.journey) {
+        if let (Goal::Vertex(target), GoalStatus::Active) = (self.goal, self.goal_status) {
             match filter.renamed(target) {
                 Some(target) => self.goal = Goal::Vertex(target),
-                None => self.journey = Journey::VertexGone,
+                None => self.goal_status = GoalStatus::VertexRemoved,
             }
         }
     }
@@ -128,11 +128,15 @@ impl<const V: usize, const HISTORY: usize> Navigator<V, HISTORY> {
         let known = self.departures.ways(filter, if ways.came_by_first { ways.count } else { 0 });
         self.decisions = self.decisions.wrapping_add(1);
         let chosen = match self.goal {
-            Goal::Stand => None,
+            Goal::Stop => None,
             Goal::Explore => self.least_used(&known, ways.count),
             Goal::Vertex(target) => {
                 self.look_around(filter, target);
-                if self.journey == Journey::Underway { self.towards(filter, target, &known, ways.count) } else { None }
+                if self.goal_status == GoalStatus::Active {
+                    self.towards(filter, target, &known, ways.count)
+                } else {
+                    None
+                }
             }
         };
         if let Some(exit) = chosen {
@@ -141,18 +145,18 @@ impl<const V: usize, const HISTORY: usize> Navigator<V, HISTORY> {
         chosen
     }
 
-    /// Whether the journey is over.
+    /// Whether the goal_status is over.
     fn look_around(&mut self, filter: &impl Filter<V>, target: VertexId) {
-        if self.journey != Journey::Underway {
+        if self.goal_status != GoalStatus::Active {
             return;
         }
         let is_there = filter.recent(0) == Some(target) && filter.place_probability_q16(target) >= CONFIRMED_Q16;
         if is_there {
-            self.journey = Journey::Arrived;
+            self.goal_status = GoalStatus::Reached;
         } else if !filter.map().contains(target) {
-            self.journey = Journey::VertexGone;
+            self.goal_status = GoalStatus::VertexRemoved;
         } else if usize::from(self.places) > 8 * V {
-            self.journey = Journey::TooLong;
+            self.goal_status = GoalStatus::TimedOut;
         }
     }
 

@@ -2,7 +2,7 @@
 
 use super::steering::{Beside, along_edge, meet_point};
 use super::turning::Turning;
-use super::{DriveConfig, DriveConfigError, Suggestion};
+use super::{DriveConfig, DriveConfigError, VelocityCommand};
 use crate::place::bearing::{HALF_TURN_MRAD, turn_mrad, turned};
 use crate::place::scan::{Closest, DEAD, Obstacle, SILENT, Scan, Ways};
 use crate::{FaultCounters, FaultKind, Turn};
@@ -33,21 +33,21 @@ const BRAKE_MM: u16 = 400;
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u8)]
 #[non_exhaustive]
-pub enum PilotState {
+pub enum DriveState {
     /// It drives along an edge of the Voronoi graph, or looks for one.
-    Follow = 0,
+    FollowEdge = 0,
     /// It homes in on a meet point and waits for the detector to confirm it.
-    Home = 1,
+    Approach = 1,
     /// It stands at a confirmed place and looks for the ways out.
-    Look = 2,
+    ChooseExit = 2,
     /// It turns to the way that was chosen.
-    Face = 3,
+    TurnToExit = 3,
     /// It leaves a place.
-    Leave = 4,
+    Depart = 4,
     /// It stands at a place because there is nothing to do.
-    Stand = 5,
+    Stopped = 5,
     /// It turns away from an obstacle, or from nowhere, to where there is room.
-    Escape = 6,
+    Recover = 6,
 }
 
 /// The ways out of a place, numbered counter-clockwise from the one the robot came by.
@@ -72,7 +72,7 @@ enum Left {
 #[derive(Clone, Debug)]
 pub(super) struct Pilot {
     config: DriveConfig,
-    state: PilotState,
+    state: DriveState,
     /// Ring frames in this state.
     frames: u16,
     /// Where the way lies by which the robot came, and the one by which it leaves.
@@ -89,7 +89,7 @@ impl Pilot {
     pub(super) const fn new() -> Self {
         Self {
             config: DriveConfig::UNSET,
-            state: PilotState::Follow,
+            state: DriveState::FollowEdge,
             frames: 0,
             back_mrad: 0,
             target_mrad: 0,
@@ -111,16 +111,16 @@ impl Pilot {
         Ok(())
     }
 
-    pub(super) const fn state(&self) -> PilotState {
+    pub(super) const fn state(&self) -> DriveState {
         self.state
     }
 
     /// Whether the robot has not left the place that was reported last.
-    pub(super) const fn is_at_place(&self) -> bool {
+    pub(super) const fn holds_place(&self) -> bool {
         match self.state {
-            PilotState::Look | PilotState::Face | PilotState::Stand => true,
-            PilotState::Leave => self.frames < SET_OFF_FRAMES,
-            PilotState::Follow | PilotState::Home | PilotState::Escape => false,
+            DriveState::ChooseExit | DriveState::TurnToExit | DriveState::Stopped => true,
+            DriveState::Depart => self.frames < SET_OFF_FRAMES,
+            DriveState::FollowEdge | DriveState::Approach | DriveState::Recover => false,
         }
     }
 
@@ -140,20 +140,20 @@ impl Pilot {
     pub(super) fn arrive(&mut self, degree: Option<u8>) {
         self.degree = degree;
         self.left = Left::Unknown;
-        self.enter(PilotState::Look);
+        self.enter(DriveState::ChooseExit);
     }
 
     /// The goal has changed: a robot that stands looks at the ways again.
     pub(super) fn reconsider(&mut self) {
-        if self.state == PilotState::Stand {
-            self.enter(PilotState::Look);
+        if self.state == DriveState::Stopped {
+            self.enter(DriveState::ChooseExit);
         }
     }
 
     /// What the pilot knew of its way holds no longer.
     pub(super) fn lose_way(&mut self) {
         self.left = Left::Unknown;
-        self.enter(PilotState::Follow);
+        self.enter(DriveState::FollowEdge);
     }
 
     /// Takes the next frame. `leaving` says whether the detector takes the robot to be still at the place it reported last;
@@ -163,65 +163,75 @@ impl Pilot {
         scan: &Scan<'_, SONARS>,
         leaving: bool,
         choose: impl FnOnce(WaysOut) -> Option<u8>,
-    ) -> Suggestion {
+    ) -> VelocityCommand {
         self.frames = self.frames.saturating_add(1);
         let closest = scan.closest();
         self.turning.feel(&closest);
         match self.state {
-            PilotState::Follow => self.follow(scan, &closest, leaving),
-            PilotState::Home => self.home(scan, &closest),
-            PilotState::Look => self.look(scan, &closest, choose),
-            PilotState::Face => self.face(scan, &closest),
-            PilotState::Leave => self.leave(scan, &closest, leaving),
-            PilotState::Escape => self.escape(scan),
-            PilotState::Stand => Suggestion::STAND,
+            DriveState::FollowEdge => self.follow(scan, &closest, leaving),
+            DriveState::Approach => self.home(scan, &closest),
+            DriveState::ChooseExit => self.look(scan, &closest, choose),
+            DriveState::TurnToExit => self.face(scan, &closest),
+            DriveState::Depart => self.leave(scan, &closest, leaving),
+            DriveState::Recover => self.escape(scan),
+            DriveState::Stopped => VelocityCommand::STOP,
         }
     }
 
-    fn enter(&mut self, state: PilotState) {
+    fn enter(&mut self, state: DriveState) {
         self.state = state;
         self.frames = 0;
     }
 
-    fn is_out_of_patience(&self) -> bool {
-        self.frames > self.config.patience_frames
+    fn is_timed_out(&self) -> bool {
+        self.frames > self.config.timeout_frames
     }
 
     /// Turns to where there is most room and starts over; how the robot left the last place says nothing any more.
-    fn give_up<const SONARS: usize>(&mut self, scan: &Scan<'_, SONARS>) -> Suggestion {
-        self.faults.count(FaultKind::DriveLost);
+    fn give_up<const SONARS: usize>(&mut self, scan: &Scan<'_, SONARS>) -> VelocityCommand {
+        self.faults.record(FaultKind::DriveLost);
         self.left = Left::Unknown;
         let most_room = scan.echoes().max_by_key(|(range_mm, _)| *range_mm);
         self.target_mrad = most_room.map_or(0, |(_, bearing_mrad)| bearing_mrad);
-        self.enter(PilotState::Escape);
-        Suggestion { heading_mrad: self.target_mrad, speed_permille: 0 }
+        self.enter(DriveState::Recover);
+        VelocityCommand { heading_mrad: self.target_mrad, speed_permille: 0 }
     }
 
-    fn escape<const SONARS: usize>(&mut self, scan: &Scan<'_, SONARS>) -> Suggestion {
+    fn escape<const SONARS: usize>(&mut self, scan: &Scan<'_, SONARS>) -> VelocityCommand {
         // Without odometry the robot knows that it has turned by what it hears ahead.
         let is_free = ahead(scan).is_none_or(|ahead| ahead.range_mm > self.config.clearance_mm.saturating_mul(2));
-        if is_free && self.frames > 5 || self.is_out_of_patience() {
-            self.enter(PilotState::Follow);
+        if is_free && self.frames > 5 || self.is_timed_out() {
+            self.enter(DriveState::FollowEdge);
         }
-        Suggestion { heading_mrad: if self.target_mrad < 0 { -1571 } else { 1571 }, speed_permille: 0 }
+        VelocityCommand { heading_mrad: if self.target_mrad < 0 { -1571 } else { 1571 }, speed_permille: 0 }
     }
 
-    fn follow<const SONARS: usize>(&mut self, scan: &Scan<'_, SONARS>, closest: &Closest, leaving: bool) -> Suggestion {
+    fn follow<const SONARS: usize>(
+        &mut self,
+        scan: &Scan<'_, SONARS>,
+        closest: &Closest,
+        leaving: bool,
+    ) -> VelocityCommand {
         if !leaving && closest.spread_mm() <= scan.equidistance_mm {
             self.back_mrad = HALF_TURN_MRAD;
-            self.enter(PilotState::Home);
+            self.enter(DriveState::Approach);
             return self.home(scan, closest);
         }
         self.drive(scan, Beside::EDGE, closest.spread_mm())
     }
 
-    fn drive<const SONARS: usize>(&mut self, scan: &Scan<'_, SONARS>, beside: Beside, spread_mm: u16) -> Suggestion {
+    fn drive<const SONARS: usize>(
+        &mut self,
+        scan: &Scan<'_, SONARS>,
+        beside: Beside,
+        spread_mm: u16,
+    ) -> VelocityCommand {
         if ahead(scan).is_some_and(|ahead| ahead.range_mm < self.config.clearance_mm) {
             return self.give_up(scan);
         }
         let heading_mrad = along_edge(scan, beside, self.config.look_ahead_mm).unwrap_or(0);
         let heading_mrad = heading_mrad.clamp(-BEND_MRAD, BEND_MRAD).saturating_add(self.sway_mrad(scan));
-        Suggestion { heading_mrad, speed_permille: self.slowed(spread_mm) }
+        VelocityCommand { heading_mrad, speed_permille: self.slowed(spread_mm) }
     }
 
     /// Where the sonar ahead is dead, a robot that sways looks with those beside it at what it would not see otherwise.
@@ -241,30 +251,30 @@ impl Pilot {
         (share as u16).max(creep)
     }
 
-    fn home<const SONARS: usize>(&mut self, scan: &Scan<'_, SONARS>, closest: &Closest) -> Suggestion {
-        if self.is_out_of_patience() {
+    fn home<const SONARS: usize>(&mut self, scan: &Scan<'_, SONARS>, closest: &Closest) -> VelocityCommand {
+        if self.is_timed_out() {
             return self.give_up(scan);
         }
         if closest.spread_mm() > scan.equidistance_mm.saturating_mul(2) && closest.spread_mm() != SILENT {
-            self.enter(PilotState::Follow);
+            self.enter(DriveState::FollowEdge);
             return self.follow(scan, closest, false);
         }
         self.track_back(&scan.ways(closest));
         match meet_point(closest) {
-            Some(way) if way.length() > i32::from(self.config.arrive_mm) => {
+            Some(way) if way.length() > i32::from(self.config.arrival_tolerance_mm) => {
                 let heading_mrad = way.bearing_mrad();
                 // What lies behind has been passed, and turning round for it would cost the bearing of the way back.
                 if i32::from(heading_mrad).abs() > 1571 {
-                    return Suggestion::STAND;
+                    return VelocityCommand::STOP;
                 }
                 let way_mm = way.length().clamp(0, i32::from(BRAKE_MM)) as u16;
-                Suggestion { heading_mrad, speed_permille: self.slowed(way_mm) }
+                VelocityCommand { heading_mrad, speed_permille: self.slowed(way_mm) }
             }
             // The third obstacle may hide before a dead sonar.
             None if self.frames > LOOK_FRAMES && scan.echoes().any(|(range_mm, _)| range_mm == DEAD) => {
-                Suggestion { heading_mrad: FACING_MRAD as i16, speed_permille: 0 }
+                VelocityCommand { heading_mrad: FACING_MRAD as i16, speed_permille: 0 }
             }
-            _ => Suggestion::STAND,
+            _ => VelocityCommand::STOP,
         }
     }
 
@@ -280,7 +290,7 @@ impl Pilot {
         scan: &Scan<'_, SONARS>,
         closest: &Closest,
         choose: impl FnOnce(WaysOut) -> Option<u8>,
-    ) -> Suggestion {
+    ) -> VelocityCommand {
         let ways = scan.ways(closest);
         self.track_back(&ways);
         let bearings_mrad = ways.bearings_mrad();
@@ -290,12 +300,12 @@ impl Pilot {
             return self.give_up(scan);
         }
         if count == 0 || !agrees && self.frames <= LOOK_FRAMES {
-            return Suggestion::STAND;
+            return VelocityCommand::STOP;
         }
         let back = ways.nearest(self.back_mrad, SAME_WAY_MRAD).map(|(index, _)| index);
         let Some(chosen) = choose(WaysOut { count: count as u8, came_by_first: back.is_some() }) else {
-            self.enter(PilotState::Stand);
-            return Suggestion::STAND;
+            self.enter(DriveState::Stopped);
+            return VelocityCommand::STOP;
         };
         self.left = match back {
             None => Left::Unknown,
@@ -304,12 +314,12 @@ impl Pilot {
         };
         let index = (back.unwrap_or(0) + usize::from(chosen)).checked_rem(count).unwrap_or(0);
         self.target_mrad = bearings_mrad.get(index).copied().unwrap_or(0);
-        self.enter(PilotState::Face);
+        self.enter(DriveState::TurnToExit);
         self.face(scan, closest)
     }
 
-    fn face<const SONARS: usize>(&mut self, scan: &Scan<'_, SONARS>, closest: &Closest) -> Suggestion {
-        if self.is_out_of_patience() {
+    fn face<const SONARS: usize>(&mut self, scan: &Scan<'_, SONARS>, closest: &Closest) -> VelocityCommand {
+        if self.is_timed_out() {
             return self.give_up(scan);
         }
         // A way that is not seen in this frame is where the turn of the ring has brought it.
@@ -326,18 +336,23 @@ impl Pilot {
         let ahead_mrad = ahead_mrad(scan);
         let is_sure = seen.is_some() || ahead_mrad > FACING_MRAD;
         if is_sure && i32::from(self.target_mrad).abs() <= ahead_mrad {
-            self.enter(PilotState::Leave);
+            self.enter(DriveState::Depart);
             return self.drive(scan, Beside::WAY_OUT, SILENT);
         }
-        Suggestion { heading_mrad: self.target_mrad, speed_permille: 0 }
+        VelocityCommand { heading_mrad: self.target_mrad, speed_permille: 0 }
     }
 
-    fn leave<const SONARS: usize>(&mut self, scan: &Scan<'_, SONARS>, closest: &Closest, leaving: bool) -> Suggestion {
-        if self.is_out_of_patience() {
+    fn leave<const SONARS: usize>(
+        &mut self,
+        scan: &Scan<'_, SONARS>,
+        closest: &Closest,
+        leaving: bool,
+    ) -> VelocityCommand {
+        if self.is_timed_out() {
             return self.give_up(scan);
         }
         if !leaving {
-            self.enter(PilotState::Follow);
+            self.enter(DriveState::FollowEdge);
             return self.follow(scan, closest, leaving);
         }
         self.drive(scan, Beside::WAY_OUT, SILENT)

@@ -1,12 +1,12 @@
-//! Two driven wheels: a suggestion becomes wheel speeds, and wheel speeds become PWM duty and direction.
+//! Two driven wheels: a velocity becomes wheel speeds, and wheel speeds become PWM duty and direction.
 
 use core::fmt;
 
 use embedded_hal::{digital::OutputPin, pwm::SetDutyCycle};
 
-use super::Suggestion;
+use super::VelocityCommand;
 
-/// How a robot with two driven wheels turns a suggestion into wheel speeds.
+/// How a robot with two driven wheels turns a velocity into wheel speeds.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct WheelsConfig {
     /// Beyond this heading the robot turns on the spot, in milliradians, 1 to 3142. Default 600.
@@ -88,10 +88,10 @@ pub struct WheelSpeeds {
 }
 
 impl WheelSpeeds {
-    /// The wheel speeds that follow a suggestion.
-    pub fn of(suggestion: Suggestion, config: &WheelsConfig) -> Self {
-        let heading_mrad = i32::from(suggestion.heading_mrad);
-        let is_on_the_spot = suggestion.speed_permille == 0 || heading_mrad.abs() > i32::from(config.spin_from_mrad);
+    /// The wheel speeds that follow a velocity.
+    pub fn from_velocity(velocity: VelocityCommand, config: &WheelsConfig) -> Self {
+        let heading_mrad = i32::from(velocity.heading_mrad);
+        let is_on_the_spot = velocity.speed_permille == 0 || heading_mrad.abs() > i32::from(config.spin_from_mrad);
         let steer = heading_mrad * i32::from(config.steer_permille_per_rad) / 1000;
         let (forward, aside) = if is_on_the_spot {
             let spin = i32::from(config.spin_permille);
@@ -99,7 +99,7 @@ impl WheelSpeeds {
         } else {
             let aside = steer.clamp(-1000, 1000);
             // The faster wheel goes no faster than it can.
-            (i32::from(suggestion.speed_permille).min(1000 - aside.abs()), aside)
+            (i32::from(velocity.speed_permille).min(1000 - aside.abs()), aside)
         };
         Self { left_permille: (forward - aside) as i16, right_permille: (forward + aside) as i16 }
     }
@@ -114,7 +114,7 @@ pub struct DifferentialDrive<PWM, DIRECTION> {
 }
 
 impl<PWM: SetDutyCycle, DIRECTION: OutputPin> DifferentialDrive<PWM, DIRECTION> {
-    /// The two motors. Nothing moves before the first suggestion.
+    /// The two motors. Nothing moves before the first velocity.
     ///
     /// # Errors
     /// Names the field of the configuration that cannot be.
@@ -127,12 +127,12 @@ impl<PWM: SetDutyCycle, DIRECTION: OutputPin> DifferentialDrive<PWM, DIRECTION> 
         Ok(Self { left, right, config })
     }
 
-    /// Sets both motors to follow a suggestion.
+    /// Sets both motors to follow a velocity.
     ///
     /// # Errors
     /// [`MotorError`] names the wheel that did not take its setting; the other one is set all the same.
-    pub fn follow(&mut self, suggestion: Suggestion) -> Result<(), MotorError> {
-        let WheelSpeeds { left_permille, right_permille } = WheelSpeeds::of(suggestion, &self.config);
+    pub fn follow(&mut self, velocity: VelocityCommand) -> Result<(), MotorError> {
+        let WheelSpeeds { left_permille, right_permille } = WheelSpeeds::from_velocity(velocity, &self.config);
         let dead_zone_permille = self.config.dead_zone_permille;
         let left = set(&mut self.left, left_permille, dead_zone_permille).map_err(|()| MotorError(Wheel::Left));
         let right = set(&mut self.right, right_permille, dead_zone_permille).map_err(|()| MotorError(Wheel::Right));
@@ -144,7 +144,7 @@ impl<PWM: SetDutyCycle, DIRECTION: OutputPin> DifferentialDrive<PWM, DIRECTION> 
     /// # Errors
     /// As [`DifferentialDrive::follow`].
     pub fn stop(&mut self) -> Result<(), MotorError> {
-        self.follow(Suggestion::STAND)
+        self.follow(VelocityCommand::STOP)
     }
 
     /// Gives the motors back.
@@ -198,8 +198,9 @@ mod tests {
     use super::*;
 
     fn speeds(heading_mrad: i16, speed_permille: u16) -> (i16, i16) {
-        let suggestion = Suggestion { heading_mrad, speed_permille };
-        let WheelSpeeds { left_permille, right_permille } = WheelSpeeds::of(suggestion, &WheelsConfig::DEFAULT);
+        let velocity = VelocityCommand { heading_mrad, speed_permille };
+        let WheelSpeeds { left_permille, right_permille } =
+            WheelSpeeds::from_velocity(velocity, &WheelsConfig::DEFAULT);
         (left_permille, right_permille)
     }
 
@@ -220,7 +221,7 @@ mod tests {
     }
 
     #[test]
-    fn every_suggestion_gives_speeds_that_the_wheels_can() {
+    fn every_command_gives_speeds_that_the_wheels_can() {
         for heading_mrad in (i16::MIN..=i16::MAX).step_by(97) {
             for speed_permille in [0, 1, 500, 1000, u16::MAX] {
                 let (left, right) = speeds(heading_mrad, speed_permille);

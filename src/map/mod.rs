@@ -140,11 +140,7 @@ impl<const V: usize> Map<V> {
     }
 
     /// Adds a vertex with a label that is the mean of `visits` fingerprints, 1 at least.
-    pub(crate) fn add_known_vertex(
-        &mut self,
-        fingerprint: Fingerprint,
-        visits: u32,
-    ) -> Result<VertexId, VerticesFull> {
+    pub(crate) fn add_known_vertex(&mut self, fingerprint: Fingerprint, visits: u32) -> Result<VertexId, VerticesFull> {
         let vertex = self.add_vertex(fingerprint)?;
         let visits = visits.clamp(1, Label::FULL);
         self.labels[vertex] = Label { sum_steps: u32::from(fingerprint.steps()) * visits, visits };

@@ -187,7 +187,7 @@ impl<const SONARS: usize> PlaceDetector<SONARS> {
         self.blind = live < usize::from(self.config.live_sensors_min);
         self.bridge();
         if self.blind {
-            self.faults.count(FaultKind::RingBlind);
+            self.faults.record(FaultKind::RingBlind);
             return None;
         }
         let meeting = self.scan().meeting();
@@ -210,13 +210,13 @@ impl<const SONARS: usize> PlaceDetector<SONARS> {
     }
 
     /// Whether the robot is still at the place that was reported last.
-    pub const fn is_leaving(&self) -> bool {
+    pub const fn is_at_place(&self) -> bool {
         self.leaving
     }
 
     /// The robot has not moved from the place that was reported last: what the ring hears while it turns on the spot does not
     /// mean that it leaves.
-    pub const fn stay(&mut self) {
+    pub const fn hold_place(&mut self) {
         if self.leaving {
             self.against = 0;
         }
@@ -257,7 +257,7 @@ impl<const SONARS: usize> PlaceDetector<SONARS> {
                 Echo::Dead => DEAD,
                 Echo::Silence => SILENT,
                 Echo::Range { range_mm } if range_mm < self.config.range_min_mm => {
-                    self.faults.count(FaultKind::SonarNonsense);
+                    self.faults.record(FaultKind::SonarOutOfRange);
                     DEAD
                 }
                 Echo::Range { range_mm } if range_mm > self.config.range_max_mm => SILENT,
@@ -342,7 +342,7 @@ impl<const SONARS: usize> PlaceDetector<SONARS> {
         let agreed = |degree: u8| close.clone().filter(|meeting| meeting.openings == degree).count() as u32;
         let degree = (1..=6).find(|degree| agreed(*degree).saturating_mul(4) >= count.saturating_mul(3));
         let Ok(fingerprint) = Fingerprint::from_radius_mm(radius_mm) else {
-            self.faults.count(FaultKind::RadiusOutOfRange);
+            self.faults.record(FaultKind::RadiusOutOfRange);
             return None;
         };
         Some(Place { fingerprint, frame_index: best.frame_index, degree, spread_mm: best.meeting.spread_mm })

@@ -101,7 +101,7 @@ fn any_one_dead_sensor_keeps_the_place() {
 fn a_ring_of_dead_sensors_is_blind_and_counted() {
     let mut detector = started::<16>();
     assert_eq!(places(&mut detector, &[RingFrame { echoes: [Echo::Dead; 16] }; 40]), []);
-    assert_eq!(detector.faults().of(FaultKind::RingBlind), 40);
+    assert_eq!(detector.faults().count(FaultKind::RingBlind), 40);
 }
 
 #[test]
@@ -122,8 +122,8 @@ fn silence_all_around_is_no_place_and_no_fault() {
 fn zero_ranges_are_nonsense_and_no_place() {
     let mut detector = started::<16>();
     assert_eq!(places(&mut detector, &[RingFrame { echoes: [Echo::Range { range_mm: 0 }; 16] }; 40]), []);
-    assert_eq!(detector.faults().of(FaultKind::SonarNonsense), 640);
-    assert_eq!(detector.faults().of(FaultKind::RingBlind), 40);
+    assert_eq!(detector.faults().count(FaultKind::SonarOutOfRange), 640);
+    assert_eq!(detector.faults().count(FaultKind::RingBlind), 40);
 }
 
 #[test]
@@ -132,7 +132,7 @@ fn a_radius_that_no_fingerprint_holds_is_counted() {
     let mut detector = PlaceDetector::<16>::new();
     detector.start(config, corridor(6000).0).unwrap();
     assert_eq!(places(&mut detector, &[RingFrame { echoes: [Echo::Range { range_mm: 9000 }; 16] }; 100]), []);
-    assert_eq!(detector.faults().of(FaultKind::RadiusOutOfRange), 1);
+    assert_eq!(detector.faults().count(FaultKind::RadiusOutOfRange), 1);
 }
 
 #[test]
@@ -141,7 +141,7 @@ fn the_longest_ranges_do_not_overflow() {
     let mut detector = PlaceDetector::<16>::new();
     detector.start(config, corridor(6000).0).unwrap();
     assert_eq!(places(&mut detector, &[RingFrame { echoes: [Echo::Range { range_mm: 65_534 }; 16] }; 300]), []);
-    assert_eq!(detector.faults().of(FaultKind::RadiusOutOfRange), 1);
+    assert_eq!(detector.faults().count(FaultKind::RadiusOutOfRange), 1);
 }
 
 #[test]

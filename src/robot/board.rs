@@ -2,7 +2,7 @@
 
 use core::fmt;
 
-use crate::drive::Suggestion;
+use crate::drive::VelocityCommand;
 use crate::wire::QueueFull;
 
 /// A board: its serial line, wheels, clock, watchdog and flash. Nothing here may wait for the other end of anything.
@@ -17,7 +17,7 @@ pub trait Board {
     fn send(&mut self, frame: &[u8]) -> Result<(), QueueFull>;
 
     /// Sets the wheels.
-    fn follow(&mut self, suggestion: Suggestion);
+    fn follow(&mut self, velocity: VelocityCommand);
 
     /// Tells the watchdog that the main loop has come round.
     fn feed_watchdog(&mut self);

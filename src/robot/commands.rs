@@ -1,13 +1,13 @@
 //! What the robot does when it is told something.
 
 use super::{Board, Line, RECEIVED_PER_TURN, Robot, restore, snapshot};
-use crate::{FaultKind, VertexId};
 use crate::drive::{self, Goal};
 use crate::persist::snapshot::Resume;
 use crate::wire::{Command, Info, Journey, JourneyState, Message, Outcome, Refusal, Setting, Settings, Version};
+use crate::{FaultKind, VertexId};
 
 /// No way to a vertex was told of.
-pub(super) const NOTHING: (Goal, drive::Journey) = (Goal::Explore, drive::Journey::None);
+pub(super) const NOTHING: (Goal, drive::GoalStatus) = (Goal::Explore, drive::GoalStatus::Inactive);
 
 impl<const SONARS: usize, const N: usize, const V: usize, const HISTORY: usize> Robot<'_, SONARS, N, V, HISTORY> {
     /// Takes what the line has received, and executes at most one command.
@@ -55,8 +55,8 @@ impl<const SONARS: usize, const N: usize, const V: usize, const HISTORY: usize> 
     }
 
     fn info(&self, board: &mut impl Board) -> Info {
-        let going_to = match (self.drive.goal(), self.drive.journey()) {
-            (Goal::Vertex(vertex), drive::Journey::Underway) => Some(vertex.into()),
+        let going_to = match (self.drive.goal(), self.drive.goal_status()) {
+            (Goal::Vertex(vertex), drive::GoalStatus::Active) => Some(vertex.into()),
             _ => None,
         };
         Info {
@@ -77,7 +77,7 @@ impl<const SONARS: usize, const N: usize, const V: usize, const HISTORY: usize> 
         let Self { mapper, drive, staging, encoder, faults, .. } = self;
         let bytes = staging.commit()?;
         if restore(mapper, drive, bytes, Resume::Elsewhere).is_err() {
-            faults.count(FaultKind::SnapshotRejected);
+            faults.record(FaultKind::SnapshotRejected);
             return Err(Refusal::BadSnapshot);
         }
         let mut line = Line { encoder, faults, board };
@@ -125,8 +125,9 @@ impl<const SONARS: usize, const N: usize, const V: usize, const HISTORY: usize> 
     }
 
     fn set_goal(&mut self, goal: Goal, board: &mut impl Board) {
-        if let (Goal::Vertex(vertex), drive::Journey::Underway) = self.told {
-            let _ = self.send(&Message::Journey(Journey { vertex: vertex.into(), state: JourneyState::Replaced }), board);
+        if let (Goal::Vertex(vertex), drive::GoalStatus::Active) = self.told {
+            let _ =
+                self.send(&Message::Journey(Journey { vertex: vertex.into(), state: JourneyState::Replaced }), board);
         }
         self.told = NOTHING;
         self.drive.set_goal(goal);
@@ -134,14 +135,14 @@ impl<const SONARS: usize, const N: usize, const V: usize, const HISTORY: usize> 
 
     /// Tells how the way to a vertex goes, whenever that has changed.
     pub(super) fn tell_journey(&mut self, board: &mut impl Board) {
-        let now = (self.drive.goal(), self.drive.journey());
+        let now = (self.drive.goal(), self.drive.goal_status());
         let (Goal::Vertex(vertex), journey) = now else { return };
         let state = match journey {
-            drive::Journey::None => return,
-            drive::Journey::Underway => JourneyState::Underway,
-            drive::Journey::Arrived => JourneyState::Arrived,
-            drive::Journey::VertexGone => JourneyState::VertexGone,
-            drive::Journey::TooLong => JourneyState::Lost,
+            drive::GoalStatus::Inactive => return,
+            drive::GoalStatus::Active => JourneyState::Underway,
+            drive::GoalStatus::Reached => JourneyState::Arrived,
+            drive::GoalStatus::VertexRemoved => JourneyState::VertexGone,
+            drive::GoalStatus::TimedOut => JourneyState::Lost,
         };
         let journey = Journey { vertex: vertex.into(), state };
         if self.told != now && self.send(&Message::Journey(journey), board).is_ok() {

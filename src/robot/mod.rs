@@ -13,7 +13,7 @@
 //! use toposlam::reference::{ROBOT, ReferenceRobot, SNAPSHOT_BYTES, SONARS};
 //! use toposlam::ring::{Echo, RingFrame};
 //! use toposlam::robot::{Board, KeepError};
-//! use toposlam::{FaultCounters, drive::Suggestion, wire::QueueFull};
+//! use toposlam::{FaultCounters, drive::VelocityCommand, wire::QueueFull};
 //!
 //! /// A board with nothing on it.
 //! struct Bare;
@@ -25,7 +25,7 @@
 //!     fn send(&mut self, _frame: &[u8]) -> Result<(), QueueFull> {
 //!         Ok(())
 //!     }
-//!     fn follow(&mut self, _suggestion: Suggestion) {}
+//!     fn follow(&mut self, _suggestion: VelocityCommand) {}
 //!     fn feed_watchdog(&mut self) {}
 //!     fn now_ms(&mut self) -> u32 {
 //!         0
@@ -56,7 +56,7 @@ mod config;
 pub use board::{Board, KeepError};
 pub use config::{RobotConfig, RobotError};
 
-use crate::drive::{Drive, Goal, Journey, Suggestion};
+use crate::drive::{Drive, Goal, GoalStatus, VelocityCommand};
 use crate::persist::snapshot::{DRIVE_SECTION, Resume, Snapshot, SnapshotError, SnapshotPolicy, Writer};
 use crate::place::Place;
 use crate::ring::RingFrame;
@@ -96,7 +96,7 @@ pub struct Robot<'buffer, const SONARS: usize, const N: usize, const V: usize, c
     last_turn_ms: Option<u32>,
     worst_turn_ms: u32,
     /// What the listener was last told of the way to a vertex.
-    told: (Goal, Journey),
+    told: (Goal, GoalStatus),
 }
 
 impl<'buffer, const SONARS: usize, const N: usize, const V: usize, const HISTORY: usize>
@@ -154,18 +154,18 @@ impl<'buffer, const SONARS: usize, const N: usize, const V: usize, const HISTORY
         self.watch_the_clock(board);
         self.obey(board);
         let faults = self.loop_faults(ring_faults);
-        let (seen, suggestion) =
+        let (seen, velocity) =
             if self.paused { self.stand(&faults, board) } else { self.map_and_drive(frame, &faults, board) };
         self.tell_ring(frame, board);
-        self.tell_drive(suggestion, board);
+        self.tell_drive(velocity, board);
         let is_due = |(_, update): &(Place, Update)| self.policy().is_due(update.place_index);
         if seen.as_ref().is_some_and(is_due) {
             // Erasing flash takes up to seconds; the robot must not drive blindly meanwhile.
-            board.follow(Suggestion::STAND);
+            board.follow(VelocityCommand::STOP);
             self.keep_snapshot(board);
             self.last_turn_ms = None;
         }
-        board.follow(suggestion);
+        board.follow(velocity);
         self.tell_journey(board);
         if self.turns.is_multiple_of(TURNS_PER_HEALTH) {
             let health = Health {
@@ -188,30 +188,30 @@ impl<'buffer, const SONARS: usize, const N: usize, const V: usize, const HISTORY
         frame: &RingFrame<SONARS>,
         faults: &FaultCounters,
         board: &mut impl Board,
-    ) -> (Seen, Suggestion) {
+    ) -> (Seen, VelocityCommand) {
         let mut line = Line { encoder: &mut self.encoder, faults: &mut self.faults, board };
         let seen = self.mapper.observe(frame, self.drive.turn(), faults, |message| line.send(message));
         let seen_now = seen.as_ref().map(|(place, update)| (place, update));
-        let suggestion = self.drive.advance(self.mapper.detector(), self.mapper.filter(), seen_now);
-        if self.drive.is_at_place() {
-            self.mapper.stay();
+        let velocity = self.drive.advance(self.mapper.detector(), self.mapper.filter(), seen_now);
+        if self.drive.holds_place() {
+            self.mapper.hold_place();
         }
-        let times_lost = self.drive.faults().of(FaultKind::DriveLost);
+        let times_lost = self.drive.faults().count(FaultKind::DriveLost);
         if times_lost != self.times_lost {
             self.times_lost = times_lost;
-            self.mapper.carried();
+            self.mapper.kidnapped();
         }
         if seen.is_some() {
             self.places_since = self.places_since.saturating_add(1);
         }
-        (seen, suggestion)
+        (seen, velocity)
     }
 
     /// A robot that is paused still says what it knows.
-    fn stand(&mut self, faults: &FaultCounters, board: &mut impl Board) -> (Seen, Suggestion) {
+    fn stand(&mut self, faults: &FaultCounters, board: &mut impl Board) -> (Seen, VelocityCommand) {
         let mut line = Line { encoder: &mut self.encoder, faults: &mut self.faults, board };
         self.mapper.tick(faults, |message| line.send(message));
-        (None, Suggestion::STAND)
+        (None, VelocityCommand::STOP)
     }
 
     /// Writes a snapshot of the drive and the mapper into the buffer, for the flash.
@@ -225,7 +225,7 @@ impl<'buffer, const SONARS: usize, const N: usize, const V: usize, const HISTORY
                 self.places_since = 0;
             }
             Ok(Err(KeepError::NoStore)) => {}
-            Ok(Err(KeepError::Failed)) | Err(_) => self.faults.count(FaultKind::StoreFailed),
+            Ok(Err(KeepError::Failed)) | Err(_) => self.faults.record(FaultKind::StoreFailed),
         }
     }
 
@@ -239,7 +239,7 @@ impl<'buffer, const SONARS: usize, const N: usize, const V: usize, const HISTORY
         let restored = restore(mapper, drive, bytes, resume);
         match restored {
             Ok(()) => self.localise_only = self.mapper.filter().is_localise_only(),
-            Err(_) => self.faults.count(FaultKind::SnapshotRejected),
+            Err(_) => self.faults.record(FaultKind::SnapshotRejected),
         }
         restored
     }
@@ -254,7 +254,7 @@ impl<'buffer, const SONARS: usize, const N: usize, const V: usize, const HISTORY
             let turn_ms = now_ms.wrapping_sub(last_ms);
             self.worst_turn_ms = self.worst_turn_ms.max(turn_ms);
             if turn_ms > u32::from(self.config.turn_bound_ms) {
-                self.faults.count(FaultKind::LoopLate);
+                self.faults.record(FaultKind::LoopLate);
             }
         }
         self.last_turn_ms = Some(now_ms);
@@ -266,11 +266,11 @@ impl<'buffer, const SONARS: usize, const N: usize, const V: usize, const HISTORY
         let _ = self.send(&ring, board);
     }
 
-    fn tell_drive(&mut self, suggestion: Suggestion, board: &mut impl Board) {
+    fn tell_drive(&mut self, velocity: VelocityCommand, board: &mut impl Board) {
         let drive = wire::Drive {
             frame_index: self.turns,
-            heading_mrad: suggestion.heading_mrad,
-            speed_permille: suggestion.speed_permille.min(i16::MAX as u16) as i16,
+            heading_mrad: velocity.heading_mrad,
+            speed_permille: velocity.speed_permille.min(i16::MAX as u16) as i16,
             state: self.drive.state() as u8,
         };
         let _ = self.send(&Message::Drive(drive), board);
@@ -335,7 +335,7 @@ impl<BOARD: Board> Line<'_, BOARD> {
         let frame = self.encoder.encode(message, &mut bytes).map_err(|_| QueueFull)?;
         let sent = self.board.send(frame);
         if sent.is_err() {
-            self.faults.count(FaultKind::WireFull);
+            self.faults.record(FaultKind::WireFull);
         }
         sent
     }

@@ -1,8 +1,8 @@
 //! CRC-32 of a frame and of a whole map.
 
 use super::Row;
-use crate::{Map, VertexId};
 use crate::checksum::CRC;
+use crate::{Map, VertexId};
 
 /// CRC-32 ISO-HDLC of some bytes.
 pub fn crc32(bytes: &[u8]) -> u32 {

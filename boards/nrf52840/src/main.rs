@@ -30,7 +30,7 @@ use nrf52840_hal::{
 use static_cell::ConstStaticCell;
 use toposlam::{
     FaultCounters, MapperConfig,
-    drive::{DifferentialDrive, Suggestion, WheelsConfig},
+    drive::{DifferentialDrive, VelocityCommand, WheelsConfig},
     persist::store::{BootPolicy, Store},
     reference::{MAPPER, ROBOT, ReferenceRobot, SNAPSHOT_BYTES, SONARS},
     ring::drivers::{SonarRing, Srf08Config, Srf08Ring},
@@ -62,9 +62,9 @@ impl Board for Nrf52840<'_> {
         self.line.send(frame)
     }
 
-    fn follow(&mut self, suggestion: Suggestion) {
+    fn follow(&mut self, velocity: VelocityCommand) {
         // Neither the timer nor the pins of this chip can refuse.
-        let _ = self.wheels.follow(suggestion);
+        let _ = self.wheels.follow(velocity);
     }
 
     fn feed_watchdog(&mut self) {
@@ -142,7 +142,7 @@ fn main() -> ! {
     let Ok(mut ring) = Srf08Ring::<_, _, SONARS>::new(bus, delay, Srf08Config::DEFAULT) else { panic!() };
     let mut ring_faults = FaultCounters::new();
     let mut board = Nrf52840 { line, wheels, watchdog, clock, store };
-    board.follow(Suggestion::STAND);
+    board.follow(VelocityCommand::STOP);
     defmt::info!("{} sonars", SONARS);
     loop {
         let frame = ring.read(&mut ring_faults);

@@ -173,7 +173,7 @@ impl Drive {
 
     /// How often the core met a fault of a kind.
     pub fn faults(&self, kind: FaultKind) -> u32 {
-        self.core.faults().of(kind)
+        self.core.faults().count(kind)
     }
 
     /// The numbers of vertices of the core's maps.

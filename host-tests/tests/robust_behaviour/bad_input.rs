@@ -16,8 +16,8 @@ fn without_room_for_a_vertex_the_map_goes_on_with_those_it_has() {
     let mut robot = Robot::new(&environment, Hints::default(), 1);
     let mut filter = started::<10, 4, 64>(1);
     drive(&mut filter, &mut robot, 200);
-    println!("full {}", filter.faults().of(FaultKind::VerticesFull));
-    assert!(filter.faults().of(FaultKind::VerticesFull) > 0);
+    println!("full {}", filter.faults().count(FaultKind::VerticesFull));
+    assert!(filter.faults().count(FaultKind::VerticesFull) > 0);
     assert_eq!(filter.map().vertices(), 4);
     assert!(filter.path().all(|vertex| vertex < 4));
 }

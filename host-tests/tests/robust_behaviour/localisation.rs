@@ -158,7 +158,7 @@ fn a_map_that_is_kept_as_it_is_has_no_room_for_what_is_new() {
         filter.polish();
     }
     assert!(filter.map().edges().eq(before.edges()) && filter.map().labels() == before.labels());
-    assert_eq!(filter.faults().of(FaultKind::VerticesFull), 0);
+    assert_eq!(filter.faults().count(FaultKind::VerticesFull), 0);
 }
 
 #[test]

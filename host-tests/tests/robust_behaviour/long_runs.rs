@@ -23,8 +23,8 @@ fn ten_thousand_places<const HISTORY: usize>(environment: &Environment, hints: H
     assert!(exact.iter().all(|&exact| exact), "{exact:?}");
     assert!(right >= 950, "{right}");
     assert_eq!(filter.observed(), PLACES as u32);
-    assert_eq!(filter.faults().of(FaultKind::HistoryFull), (PLACES - HISTORY) as u32);
-    assert_eq!(filter.faults().of(FaultKind::VerticesFull), 0);
+    assert_eq!(filter.faults().count(FaultKind::HistoryFull), (PLACES - HISTORY) as u32);
+    assert_eq!(filter.faults().count(FaultKind::VerticesFull), 0);
     // What left the record fades beyond 512 visits a vertex; what is in it comes on top.
     assert!(visits.iter().all(|&visits| (10..=512 + HISTORY as u32).contains(&visits)), "{visits:?}");
     assert!(filter.evidence().0.is_finite());

@@ -95,7 +95,7 @@ fn assert_sound(frame: RingFrame<16>, faults: &FaultCounters, nearest_mm: u16, f
     for range_mm in frame.echoes.into_iter().filter_map(Echo::range_mm) {
         assert!((nearest_mm..=farthest_mm).contains(&range_mm), "{range_mm} mm");
     }
-    let counted: u32 = FaultKind::ALL.into_iter().map(|kind| faults.of(kind)).sum();
+    let counted: u32 = FaultKind::ALL.into_iter().map(|kind| faults.count(kind)).sum();
     assert_eq!(counted as usize, frame.dead_sensors().count());
 }
 

@@ -76,7 +76,7 @@ fn a_sensor_in_trouble_is_dead_and_counted_and_the_others_go_on() {
     let cases = [
         (HcSr04Fault::NeverRises, SonarFault::Silent),
         (HcSr04Fault::HeldHigh, SonarFault::Stuck),
-        (HcSr04Fault::Spike, SonarFault::Nonsense),
+        (HcSr04Fault::Spike, SonarFault::OutOfRange),
         (HcSr04Fault::EchoPinBroken, SonarFault::Bus),
         (HcSr04Fault::TriggerPinBroken, SonarFault::Bus),
     ];

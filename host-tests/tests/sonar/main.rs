@@ -50,7 +50,7 @@ pub(crate) type World = Box<dyn FnMut() -> Option<RingFrame<16>>>;
 pub(crate) fn assert_counted(faults: &FaultCounters, fault: Option<SonarFault>, count: u32) {
     for kind in FaultKind::ALL {
         let expected = if fault.map(SonarFault::kind) == Some(kind) { count } else { 0 };
-        assert_eq!(faults.of(kind), expected, "{fault:?} counted as {kind:?}");
+        assert_eq!(faults.count(kind), expected, "{fault:?} counted as {kind:?}");
     }
 }
 

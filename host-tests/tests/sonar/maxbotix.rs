@@ -61,8 +61,8 @@ fn a_sensor_in_trouble_is_dead_and_counted_and_the_frame_takes_no_longer() {
         (SensorFault::Absent, SonarFault::Silent),
         (SensorFault::NeverDone, SonarFault::Silent),
         (SensorFault::RefusesData, SonarFault::Silent),
-        (SensorFault::Zeros, SonarFault::Nonsense),
-        (SensorFault::Nonsense, SonarFault::Nonsense),
+        (SensorFault::Zeros, SonarFault::OutOfRange),
+        (SensorFault::OutOfRange, SonarFault::OutOfRange),
         (SensorFault::BlocksBus, SonarFault::Bus),
     ];
     for sensor in [0_u8, 7, 15] {
@@ -108,7 +108,7 @@ fn the_driver_puts_the_data_sheets_bytes_on_the_bus_at_the_data_sheets_times() {
     let frame = ring.read(&mut faults);
     assert_eq!(frame.echoes, [Echo::Range { range_mm: 2910 }, Echo::Dead, Echo::Silence, Echo::Dead]);
     assert!(frame.dead_sensors().eq([1, 3]));
-    assert_eq!(ring.last_error(), Some(SonarError { sensor: 3, fault: SonarFault::Nonsense }));
+    assert_eq!(ring.last_error(), Some(SonarError { sensor: 3, fault: SonarFault::OutOfRange }));
     let (mut bus, mut delay) = ring.release();
     bus.done();
     delay.done();

@@ -59,7 +59,7 @@ fn a_sensor_in_trouble_is_dead_and_counted_and_the_others_go_on() {
         (SensorFault::Absent, Echo::Dead, Some(SonarFault::Silent)),
         (SensorFault::NeverDone, Echo::Dead, Some(SonarFault::Silent)),
         (SensorFault::RefusesData, Echo::Dead, Some(SonarFault::Silent)),
-        (SensorFault::Nonsense, Echo::Dead, Some(SonarFault::Nonsense)),
+        (SensorFault::OutOfRange, Echo::Dead, Some(SonarFault::OutOfRange)),
         (SensorFault::BlocksBus, Echo::Dead, Some(SonarFault::Bus)),
         (SensorFault::Zeros, Echo::Silence, None),
     ];
@@ -103,13 +103,13 @@ fn when_the_bridge_is_cut_off_every_sensor_is_dead_and_a_healed_line_works_again
     link.cut = true;
     let mut ring = Srf08Ring::new(Sc18im700::new(link, 100), waited, Srf08Config::DEFAULT).unwrap();
     assert_eq!(ring.read(&mut faults), RingFrame { echoes: [Echo::Dead; 16] });
-    assert_eq!(faults.of(FaultKind::BusError), 16);
+    assert_eq!(faults.count(FaultKind::BusError), 16);
     let (cut, waited) = ring.release();
     bridge = Sc18im700::new(Link { cut: false, ..cut.release() }, 100);
     bridge.start().unwrap();
     let mut ring = Srf08Ring::new(bridge, waited, Srf08Config::DEFAULT).unwrap();
     assert_eq!(ring.read(&mut faults), world_frame(1));
-    assert_eq!(faults.of(FaultKind::BusError), 16);
+    assert_eq!(faults.count(FaultKind::BusError), 16);
 }
 
 #[test]
@@ -120,7 +120,7 @@ fn after_the_last_frame_of_the_world_the_ring_is_dead_and_does_not_hang() {
     let mut faults = FaultCounters::new();
     ring.read(&mut faults);
     assert_eq!(ring.read(&mut faults), RingFrame { echoes: [Echo::Dead; 16] });
-    assert_eq!(faults.of(FaultKind::SonarSilent), 16);
+    assert_eq!(faults.count(FaultKind::SonarSilent), 16);
 }
 
 #[test]
@@ -160,6 +160,6 @@ fn together_means_one_write_to_the_general_call_address() {
     let mut ring = Srf08Ring::<_, _, 2>::new(I2cMock::new(&expected), &mut waited, config).unwrap();
     let mut faults = FaultCounters::new();
     assert_eq!(ring.read(&mut faults).echoes, [Echo::Range { range_mm: 1000 }, Echo::Dead]);
-    assert_eq!(ring.last_error(), Some(SonarError { sensor: 1, fault: SonarFault::Nonsense }));
+    assert_eq!(ring.last_error(), Some(SonarError { sensor: 1, fault: SonarFault::OutOfRange }));
     ring.release().0.done();
 }

@@ -204,7 +204,7 @@ fn a_late_listener_has_everything_after_one_round_of_the_rolling_picture() {
             robot.drive(&mut random);
             robot.place(&mut random);
         }
-        robot.faults.count(FaultKind::BusError);
+        robot.faults.record(FaultKind::BusError);
         for _ in 0..joined_at {
             robot.tick(&mut random);
         }

@@ -160,8 +160,8 @@ fn explore() -> Vec<Vec<u8>> {
         exploration.board().sent.clear();
         let ring = exploration.frame();
         let is_place = exploration.map(&ring).is_some();
-        let suggestion = exploration.board().suggestion;
-        exploration.drive(suggestion);
+        let velocity = exploration.board().velocity;
+        exploration.drive(velocity);
         let turn = exploration.frames();
         let mut messages: Vec<Message> =
             hear(&exploration.board().sent).messages.into_iter().map(|(_, message)| message).collect();

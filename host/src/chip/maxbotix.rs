@@ -117,7 +117,7 @@ impl<WORLD: FnMut() -> Option<RingFrame<SONARS>>, const SONARS: usize> I2cDevice
             (Some(SensorFault::BlocksBus), _) => return BusAnswer::TimedOut,
             (_, None) => PART_INFORMATION,
             (Some(SensorFault::Zeros), _) => 0,
-            (Some(SensorFault::Nonsense), _) => u16::MAX,
+            (Some(SensorFault::OutOfRange), _) => u16::MAX,
             _ => range_cm(self.surroundings.heard(index)),
         };
         BusAnswer::Acknowledged(word.to_be_bytes().into_iter().chain(std::iter::repeat(0xFF)).take(count).collect())

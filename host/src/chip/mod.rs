@@ -33,7 +33,7 @@ pub enum SensorFault {
     /// It answers 0, whatever is there.
     Zeros,
     /// It answers 65,535.
-    Nonsense,
+    OutOfRange,
     /// It refuses the data that is written to it.
     RefusesData,
     /// It blocks the bus whenever it is read.

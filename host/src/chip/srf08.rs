@@ -166,7 +166,7 @@ impl<WORLD: FnMut() -> Option<RingFrame<SENSORS>>> I2cDevices for Srf08Bank<WORL
         }
         let echo_us = match (sensor.fault, self.surroundings.heard(index)) {
             (Some(SensorFault::Zeros), _) => 0,
-            (Some(SensorFault::Nonsense), _) => u16::MAX,
+            (Some(SensorFault::OutOfRange), _) => u16::MAX,
             (_, Echo::Range { range_mm }) => u16::try_from(flight_us(range_mm)).unwrap_or(u16::MAX),
             (_, Echo::Silence | Echo::Dead) => 0,
         };

@@ -10,7 +10,7 @@ use std::{
 
 use anyhow::{Context, bail, ensure};
 use clap::Args;
-use toposlam::drive::Suggestion;
+use toposlam::drive::VelocityCommand;
 use toposlam::reference::SNAPSHOT_BYTES;
 use toposlam::wire::{Belief, Evidence, Location, Message, Worst};
 use toposlam_host::emulator::Emulation;
@@ -48,12 +48,12 @@ pub(crate) struct Arguments {
 }
 
 /// So long the world waits for the firmware to say where it drives.
-const SUGGESTION_TIMEOUT: Duration = Duration::from_secs(10);
+const VELOCITY_TIMEOUT: Duration = Duration::from_secs(10);
 
 /// The same robot on this computer, and where it wanted to go after each frame.
 struct Repetition<'buffer> {
     exploration: Exploration<'buffer>,
-    suggestions: Vec<Suggestion>,
+    velocities: Vec<VelocityCommand>,
 }
 
 pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
@@ -72,9 +72,9 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     // The emulator asks for frames on one thread and hands on what it heard on another.
     let repetition = Mutex::new(Repetition {
         exploration: Exploration::start(&plan, model, arguments.drive.seed(), &mut buffer)?,
-        suggestions: Vec::new(),
+        velocities: Vec::new(),
     });
-    let (tell_suggestion, suggestions) = mpsc::channel::<Suggestion>();
+    let (tell_velocity, velocities) = mpsc::channel::<VelocityCommand>();
     let progress = progress_bar(arguments.places)?;
     let mut heard = Heard::new();
     let mut elsewhere = None;
@@ -85,8 +85,8 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
         move || {
             if frames > 0 {
                 // The firmware has driven on by what it said after the last frame.
-                let suggestion = suggestions.recv_timeout(SUGGESTION_TIMEOUT).ok()?;
-                repeated.lock().ok()?.exploration.drive(suggestion);
+                let velocity = velocities.recv_timeout(VELOCITY_TIMEOUT).ok()?;
+                repeated.lock().ok()?.exploration.drive(velocity);
             }
             let mut repetition = repeated.lock().ok()?;
             if repetition.exploration.places() >= arguments.places {
@@ -100,8 +100,8 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
                 bar.suspend(|| println!("{step}"));
                 bar.inc(1);
             }
-            let suggestion = repetition.exploration.board().suggestion;
-            repetition.suggestions.push(suggestion);
+            let velocity = repetition.exploration.board().velocity;
+            repetition.velocities.push(velocity);
             Some(frame)
         },
         |bytes, _| {
@@ -110,11 +110,11 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
                 let is_same = match message {
                     Message::Drive(drive) => {
                         let speed_permille = drive.speed_permille.unsigned_abs();
-                        let suggestion = Suggestion { heading_mrad: drive.heading_mrad, speed_permille };
+                        let velocity = VelocityCommand { heading_mrad: drive.heading_mrad, speed_permille };
                         // The world may have ended meanwhile.
-                        let _ = tell_suggestion.send(suggestion);
-                        let expected = repetition.suggestions.get(drive.frame_index as usize);
-                        expected.is_none_or(|expected| *expected == suggestion)
+                        let _ = tell_velocity.send(velocity);
+                        let expected = repetition.velocities.get(drive.frame_index as usize);
+                        expected.is_none_or(|expected| *expected == velocity)
                     }
                     Message::Location(location) => {
                         let step = repetition.exploration.steps().get(location.place_index as usize);

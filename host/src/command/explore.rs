@@ -4,7 +4,7 @@
 use anyhow::ensure;
 use clap::Args;
 use rayon::prelude::*;
-use toposlam::drive::Journey;
+use toposlam::drive::GoalStatus;
 use toposlam::reference::SNAPSHOT_BYTES;
 use toposlam::wire::Command;
 use toposlam_host::exploration::Exploration;
@@ -144,7 +144,7 @@ fn travel(exploration: &mut Exploration<'_>, journeys: u64, seed: u64) -> Journe
         while exploration.is_underway() && exploration.frames() < begun + FRAMES_PER_JOURNEY {
             exploration.advance();
         }
-        if exploration.robot().drive().journey() == Journey::Arrived {
+        if exploration.robot().drive().goal_status() == GoalStatus::Reached {
             let node = exploration.nodes().last().copied().flatten();
             outcome.arrived += u64::from(node == truth);
             outcome.elsewhere += u64::from(node != truth);

@@ -10,7 +10,7 @@ use std::{
 };
 
 use anyhow::{Context, bail, ensure};
-use toposlam::drive::Suggestion;
+use toposlam::drive::VelocityCommand;
 use toposlam::persist::snapshot::Resume;
 use toposlam::place::Place;
 use toposlam::reference::{SNAPSHOT_BYTES, SONARS};
@@ -60,7 +60,7 @@ pub(super) fn run(
     let exploration = Exploration::start(&plan, model, arguments.seed(), &mut buffer)?;
     // The emulator asks for frames on one thread and hands on what it heard on another.
     let trial = Mutex::new(Trial { exploration, frames: 0, is_over: false });
-    let (tell_suggestion, suggestions) = mpsc::channel::<Suggestion>();
+    let (tell_velocity, velocities) = mpsc::channel::<VelocityCommand>();
     let bar = progress_bar(places)?;
     let mut heard = Heard::new();
     let mut line = LineInjector::new(rates, arguments.seed());
@@ -75,13 +75,13 @@ pub(super) fn run(
     let outcome = emulation.run(
         move || {
             if last.is_some() {
-                let Ok(suggestion) = suggestions.recv_timeout(PATIENCE) else { return last };
+                let Ok(velocity) = velocities.recv_timeout(PATIENCE) else { return last };
                 let mut trial = world.lock().ok()?;
-                trial.exploration.drive(suggestion);
+                trial.exploration.drive(velocity);
                 // Frames of the firmware in which no sensor heard its start.
-                while let Ok(suggestion) = suggestions.try_recv() {
+                while let Ok(velocity) = velocities.try_recv() {
                     trial.frame();
-                    trial.exploration.drive(suggestion);
+                    trial.exploration.drive(velocity);
                 }
             }
             let mut trial = world.lock().ok()?;
@@ -107,7 +107,8 @@ pub(super) fn run(
                         turns = drive.frame_index.wrapping_add(1);
                         let speed_permille = drive.speed_permille.unsigned_abs();
                         // The world may have ended meanwhile.
-                        let _ = tell_suggestion.send(Suggestion { heading_mrad: drive.heading_mrad, speed_permille });
+                        let _ =
+                            tell_velocity.send(VelocityCommand { heading_mrad: drive.heading_mrad, speed_permille });
                         if trial.is_over {
                             fetch.turn(to_firmware);
                         } else {

@@ -63,7 +63,7 @@ impl RingInjector {
         if self.stuck_frames_left > 0 {
             self.stuck_frames_left -= 1;
             self.counts.stuck_frames += 1;
-            (0..SONARS).for_each(|_| driver.count(FaultKind::BusError));
+            (0..SONARS).for_each(|_| driver.record(FaultKind::BusError));
             return RingFrame { echoes: [Echo::Dead; SONARS] };
         }
         let mut frame = match self.before {
@@ -77,7 +77,7 @@ impl RingInjector {
         for echo in &mut frame.echoes {
             if self.chance.happens(self.rates.answer_lost) {
                 self.counts.lost_answers += 1;
-                driver.count(FaultKind::SonarSilent);
+                driver.record(FaultKind::SonarSilent);
                 *echo = Echo::Dead;
             } else if self.chance.happens(self.rates.range_corrupted) {
                 self.counts.corrupted_ranges += 1;
@@ -120,7 +120,7 @@ mod tests {
         assert!(counts.stuck_frames > 0 && counts.delayed_frames > 0 && counts.corrupted_ranges > 0);
         assert_eq!(blind, counts.stuck_frames);
         assert_eq!(dead as u64, counts.lost_answers + SONARS as u64 * counts.stuck_frames);
-        assert_eq!(u64::from(driver.of(FaultKind::SonarSilent)), counts.lost_answers);
-        assert_eq!(u64::from(driver.of(FaultKind::BusError)), SONARS as u64 * counts.stuck_frames);
+        assert_eq!(u64::from(driver.count(FaultKind::SonarSilent)), counts.lost_answers);
+        assert_eq!(u64::from(driver.count(FaultKind::BusError)), SONARS as u64 * counts.stuck_frames);
     }
 }

@@ -58,7 +58,7 @@ pub struct Account {
     /// Sonars on a stuck bus.
     pub bus_error: u64,
     /// Ranges below what a sonar can measure, in frames that were mapped.
-    pub sonar_nonsense: u64,
+    pub sonar_out_of_range: u64,
     /// Mapped frames with too few live sonars.
     pub ring_blind: u64,
     /// What a decoder of the same bytes takes for no request.
@@ -76,7 +76,7 @@ impl Account {
         [
             (FaultKind::SonarSilent, self.sonar_silent),
             (FaultKind::BusError, self.bus_error),
-            (FaultKind::SonarNonsense, self.sonar_nonsense),
+            (FaultKind::SonarOutOfRange, self.sonar_out_of_range),
             (FaultKind::RingBlind, self.ring_blind),
             (FaultKind::WireCorrupt, self.wire_corrupt),
             (FaultKind::CommandFlood, self.command_flood),
@@ -155,16 +155,16 @@ impl Soak {
                 }
             });
             kept += u64::from(!mem::take(&mut exploration.board().kept).is_empty());
-            let suggestion = exploration.board().suggestion;
-            exploration.drive(suggestion);
+            let velocity = exploration.board().velocity;
+            exploration.drive(velocity);
         }
         let places = exploration.places() as u64;
         let observed = u64::from(exploration.robot().mapper().filter().observed());
         let driver = *exploration.ring_faults();
         let counted_from = auditor.restored_at.max(toposlam::reference::HISTORY as u64);
         let account = Account {
-            sonar_silent: driver.of(FaultKind::SonarSilent).into(),
-            bus_error: driver.of(FaultKind::BusError).into(),
+            sonar_silent: driver.count(FaultKind::SonarSilent).into(),
+            bus_error: driver.count(FaultKind::BusError).into(),
             history_full: places.saturating_sub(counted_from),
             ..auditor.account
         };
@@ -245,10 +245,10 @@ impl Auditor {
             return;
         }
         let place = toposlam::reference::PLACE;
-        let is_nonsense = |echo: &&Echo| matches!(echo, Echo::Range { range_mm } if *range_mm < place.range_min_mm);
-        let nonsense = frame.echoes.iter().filter(is_nonsense).count();
-        let live = SONARS - nonsense - frame.dead_sensors().count();
-        self.account.sonar_nonsense += nonsense as u64;
+        let is_out_of_range = |echo: &&Echo| matches!(echo, Echo::Range { range_mm } if *range_mm < place.range_min_mm);
+        let out_of_range = frame.echoes.iter().filter(is_out_of_range).count();
+        let live = SONARS - out_of_range - frame.dead_sensors().count();
+        self.account.sonar_out_of_range += out_of_range as u64;
         self.account.ring_blind += u64::from(live < usize::from(place.live_sensors_min));
     }
 }
@@ -282,11 +282,11 @@ impl Life {
         hold(observed == places, format!("the filter has {observed} places, reported were {places}"));
         hold(*out_of_order == 0, format!("{out_of_order} places had a number out of order"));
         for (kind, expected) in self.account.rows() {
-            let counted = u64::from(self.faults.of(kind));
+            let counted = u64::from(self.faults.count(kind));
             hold(counted == expected, format!("{kind:?} was counted {counted} times, not {expected}"));
         }
         for kind in [FaultKind::LoopLate, FaultKind::StoreFailed, FaultKind::SnapshotRejected, FaultKind::WireFull] {
-            hold(self.faults.of(kind) == 0, format!("{kind:?} was counted {} times", self.faults.of(kind)));
+            hold(self.faults.count(kind) == 0, format!("{kind:?} was counted {} times", self.faults.count(kind)));
         }
         mistakes
     }
@@ -310,7 +310,7 @@ impl Life {
             format!("stopped by a wall in {} turns", self.bumps),
         ];
         lines.extend(fault_lines(&self.faults).into_iter().map(|line| format!("fault {line}")));
-        lines.push(format!("fault LoopLate: {}", self.faults.of(FaultKind::LoopLate)));
+        lines.push(format!("fault LoopLate: {}", self.faults.count(FaultKind::LoopLate)));
         lines.push(format!(
             "against the true map: exact {}, edge F1 {:.2}, located in {:.0} % of the places that are remembered",
             if self.score.exact { "yes" } else { "no" },

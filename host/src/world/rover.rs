@@ -3,7 +3,7 @@
 use rand::SeedableRng;
 use rand_distr::{Distribution, StandardNormal};
 use rand_xoshiro::Xoshiro256PlusPlus;
-use toposlam::drive::{Suggestion, WheelSpeeds, WheelsConfig};
+use toposlam::drive::{VelocityCommand, WheelSpeeds, WheelsConfig};
 use toposlam::ring::RingFrame;
 
 use super::sight::{SONARS, Scene, wrapped};
@@ -21,7 +21,7 @@ pub struct BodyModel {
     pub radius_mm: f64,
     /// The distance between the wheels, in millimetres. Default 200.
     pub track_mm: f64,
-    /// How the robot turns a suggestion into wheel speeds.
+    /// How the robot turns a velocity into wheel speeds.
     pub wheels: WheelsConfig,
     /// Standard deviation by which each wheel is faster or slower than it should be, as a share. Default 0.05. It lasts as
     /// long as the deviations of [`RobotModel`].
@@ -34,7 +34,7 @@ impl Default for BodyModel {
     }
 }
 
-/// A robot in a floor plan. Read a frame, follow a suggestion, and so on; the same plan, model, seed and suggestions give the
+/// A robot in a floor plan. Read a frame, follow a velocity, and so on; the same plan, model, seed and velocities give the
 /// same frames.
 pub struct Rover {
     scene: Scene,
@@ -93,8 +93,8 @@ impl Rover {
     }
 
     /// Drives on until the next frame.
-    pub fn follow(&mut self, suggestion: Suggestion) {
-        let WheelSpeeds { left_permille, right_permille } = WheelSpeeds::of(suggestion, &self.body.wheels);
+    pub fn follow(&mut self, velocity: VelocityCommand) {
+        let WheelSpeeds { left_permille, right_permille } = WheelSpeeds::from_velocity(velocity, &self.body.wheels);
         let kept = (-1.0 / (self.model.frames_per_s * self.model.deviation_s)).exp();
         let [left, right] = [(0, left_permille), (1, right_permille)].map(|(wheel, permille)| {
             let fresh: f64 = StandardNormal.sample(&mut self.random);

@@ -7,8 +7,8 @@ use embedded_hal::{digital, pwm};
 use static_cell::ConstStaticCell;
 use toposlam::FaultCounters;
 use toposlam::drive::{
-    DifferentialDrive, Drive, DriveConfig, DriveConfigError, Goal, MotorError, Suggestion, WheelSpeeds, WheelsConfig,
-    WheelsConfigError,
+    DifferentialDrive, Drive, DriveConfig, DriveConfigError, Goal, MotorError, VelocityCommand, WheelSpeeds,
+    WheelsConfig, WheelsConfigError,
 };
 use toposlam::persist::snapshot::{Resume, SnapshotError};
 use toposlam::reference::{self, HISTORY, ReferenceRobot, SNAPSHOT_BYTES, VERTICES};
@@ -30,8 +30,8 @@ impl Board for Any {
         black_box(Ok(()))
     }
 
-    fn follow(&mut self, suggestion: Suggestion) {
-        black_box(suggestion);
+    fn follow(&mut self, velocity: VelocityCommand) {
+        black_box(velocity);
     }
 
     fn feed_watchdog(&mut self) {
@@ -86,11 +86,11 @@ impl digital::OutputPin for AnyMotor {
 }
 
 pub(crate) fn drive() {
-    let suggestion = Suggestion { heading_mrad: 3, speed_permille: 4 }.opaque();
-    black_box(WheelSpeeds::of(suggestion, &WheelsConfig::DEFAULT.opaque()));
+    let velocity = VelocityCommand { heading_mrad: 3, speed_permille: 4 }.opaque();
+    black_box(WheelSpeeds::from_velocity(velocity, &WheelsConfig::DEFAULT.opaque()));
     match DifferentialDrive::new((AnyMotor, AnyMotor), (AnyMotor, AnyMotor), WheelsConfig::DEFAULT.opaque()) {
         Ok(mut wheels) => {
-            if let Err(error) = wheels.follow(suggestion).and(wheels.stop()) {
+            if let Err(error) = wheels.follow(velocity).and(wheels.stop()) {
                 show::<MotorError>(error);
             }
             black_box(wheels.release().len());
@@ -103,8 +103,8 @@ pub(crate) fn drive() {
         show::<DriveConfigError>(error);
     }
     drive.set_goal(Goal::Vertex(3).opaque());
-    drive.carried();
-    black_box((drive.turn(), drive.goal(), drive.journey(), drive.state(), drive.is_at_place(), drive.faults()));
+    drive.kidnapped();
+    black_box((drive.turn(), drive.goal(), drive.goal_status(), drive.state(), drive.holds_place(), drive.faults()));
 }
 
 pub(crate) fn robot() {

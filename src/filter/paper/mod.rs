@@ -149,7 +149,7 @@ impl<const N: usize, const V: usize, const WORDS: usize> PaperFilter<N, V, WORDS
 
     fn remember(&mut self, fingerprint: Fingerprint) {
         if self.history.push(fingerprint).is_some() {
-            self.faults.count(FaultKind::HistoryFull);
+            self.faults.record(FaultKind::HistoryFull);
         }
         let length = self.length();
         self.consistency.include_newest(&self.history, length);
@@ -157,7 +157,7 @@ impl<const N: usize, const V: usize, const WORDS: usize> PaperFilter<N, V, WORDS
 
     fn finish(&mut self, step: Step) -> Update {
         if step.vertices_full {
-            self.faults.count(FaultKind::VerticesFull);
+            self.faults.record(FaultKind::VerticesFull);
         }
         let best = self.best();
         let update = Update {

@@ -76,8 +76,7 @@ impl<E: Evidence<WORDS>, const N: usize, const V: usize, const WORDS: usize, con
         }
         for ((parent, candidates), weights) in self.parents.iter().zip(self.pool.iter()).zip(&mut self.weights) {
             for vertex in successors(&parent.map) {
-                weights[vertex] =
-                    draw_weight(candidates[vertex].ln_proposal, ln_best) * u32::from(parent.multiplicity);
+                weights[vertex] = draw_weight(candidates[vertex].ln_proposal, ln_best) * u32::from(parent.multiplicity);
             }
         }
     }
@@ -316,7 +315,12 @@ fn ln_label<const V: usize>(
 }
 
 /// ln of Eq. 9 for a prediction, from that of its parent.
-fn ln_size<const V: usize>(likelihood: &Likelihood, parent: &Particle<V>, vertex: VertexId, observation: Fingerprint) -> i32 {
+fn ln_size<const V: usize>(
+    likelihood: &Likelihood,
+    parent: &Particle<V>,
+    vertex: VertexId,
+    observation: Fingerprint,
+) -> i32 {
     let (before, after) = (parent.map.label(vertex), parent.map.label_with(vertex, observation));
     if before == Some(after) {
         return parent.factors.ln_size_q16;

@@ -211,7 +211,7 @@ impl<const N: usize, const V: usize, const HISTORY: usize> RobustFilter<N, V, HI
         }
         observation.begins |= self.record.is_empty();
         if self.record.is_full() {
-            self.faults.count(FaultKind::HistoryFull);
+            self.faults.record(FaultKind::HistoryFull);
             let record = &self.record;
             let mut have_faded = false;
             self.beam.each(|hypothesis| have_faded |= hypothesis.settle_oldest(record));
@@ -228,7 +228,7 @@ impl<const N: usize, const V: usize, const HISTORY: usize> RobustFilter<N, V, HI
         if let Some(entry) = self.record.get(index)
             && self.beam.grow(&self.prices, &self.record, (index, entry), wanted, self.localise_only)
         {
-            self.faults.count(FaultKind::VerticesFull);
+            self.faults.record(FaultKind::VerticesFull);
         }
         self.polished = 0;
         if self.localise_only {

@@ -142,10 +142,11 @@ impl<const V: usize, const T: usize> Names<V, T> {
             if is_named || row.iter().any(|&count| count > 0) || best.tally(vertex).visits < 2 {
                 continue;
             }
-            for name in
-                (0..best.vertices.min(map.vertices().len() as u8)).filter(|&name| taken >> (name & 63) & 1 == 0 && is_idle(name))
+            for name in (0..best.vertices.min(map.vertices().len() as u8))
+                .filter(|&name| taken >> (name & 63) & 1 == 0 && is_idle(name))
             {
-                let label = VertexId::new(name).and_then(|name| map.label(name)).map_or(0.0, |label| f32::from(label.steps()));
+                let label =
+                    VertexId::new(name).and_then(|name| map.label(name)).map_or(0.0, |label| f32::from(label.steps()));
                 let off = (best.tally(vertex).mean() - label).abs();
                 if nearest.is_none_or(|(least, ..)| off < least) {
                     nearest = Some((off, vertex, name));

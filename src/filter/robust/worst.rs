@@ -21,7 +21,9 @@ pub(super) fn worst_ngram<const V: usize, const T: usize>(record: &Record<T>, ma
     // How far the path is from each n-gram, by the place of its newest label: first of that label alone.
     let mut bounds = [0_u16; T];
     for ((entry, &vertex), bound) in record.iter().zip(path).zip(&mut bounds) {
-        *bound = VertexId::new(vertex).and_then(|vertex| map.label(vertex)).map_or(0, |label| entry.steps.abs_diff(label.steps()));
+        *bound = VertexId::new(vertex)
+            .and_then(|vertex| map.label(vertex))
+            .map_or(0, |label| entry.steps.abs_diff(label.steps()));
     }
     for end in (LENGTH - 1..record.len()).rev() {
         let largest = bounds.get(end + 1 - LENGTH..=end).and_then(|bounds| bounds.iter().max()).copied();

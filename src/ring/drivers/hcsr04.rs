@@ -90,7 +90,7 @@ impl<const SONARS: usize> HcSr04Config<SONARS> {
     /// What the length of a pulse means.
     fn echo(&self, pulse_us: u32) -> Result<Echo, SonarFault> {
         match u16::try_from(range_mm(pulse_us, self.speed_of_sound_m_per_s)) {
-            Ok(range_mm) if range_mm < self.min_range_mm => Err(SonarFault::Nonsense),
+            Ok(range_mm) if range_mm < self.min_range_mm => Err(SonarFault::OutOfRange),
             Ok(range_mm) if range_mm <= self.max_range_mm => Ok(Echo::Range { range_mm }),
             _ => Ok(Echo::Silence),
         }
@@ -295,7 +295,7 @@ mod tests {
     fn a_pulse_too_short_for_the_data_sheet_is_nonsense_and_one_too_long_is_silence() {
         let config = HcSr04Config::<1>::DEFAULT;
         for pulse_us in [0, 1, 113] {
-            assert_eq!(config.echo(pulse_us), Err(SonarFault::Nonsense));
+            assert_eq!(config.echo(pulse_us), Err(SonarFault::OutOfRange));
         }
         for pulse_us in [23_400, 38_000, 200_000, u32::MAX] {
             assert_eq!(config.echo(pulse_us), Ok(Echo::Silence));

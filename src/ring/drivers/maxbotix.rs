@@ -53,7 +53,7 @@ fn echo(range_cm: u16) -> Result<Echo, SonarFault> {
     match range_cm {
         NOTHING_HEARD_CM => Ok(Echo::Silence),
         NEAREST_CM..NOTHING_HEARD_CM => Ok(Echo::Range { range_mm: range_cm * 10 }),
-        _ => Err(SonarFault::Nonsense),
+        _ => Err(SonarFault::OutOfRange),
     }
 }
 
@@ -129,13 +129,13 @@ mod tests {
     #[test]
     fn centimetres_become_millimetres_and_765_is_silence() {
         for (range_cm, expected) in [
-            (0, Err(SonarFault::Nonsense)),
-            (19, Err(SonarFault::Nonsense)),
+            (0, Err(SonarFault::OutOfRange)),
+            (19, Err(SonarFault::OutOfRange)),
             (20, Ok(Echo::Range { range_mm: 200 })),
             (764, Ok(Echo::Range { range_mm: 7640 })),
             (765, Ok(Echo::Silence)),
-            (766, Err(SonarFault::Nonsense)),
-            (u16::MAX, Err(SonarFault::Nonsense)),
+            (766, Err(SonarFault::OutOfRange)),
+            (u16::MAX, Err(SonarFault::OutOfRange)),
         ] {
             assert_eq!(echo(range_cm), expected, "{range_cm} cm");
         }

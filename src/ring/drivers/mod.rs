@@ -92,7 +92,7 @@ pub enum SonarFault {
     /// It did not acknowledge its address, or was still ranging when the time was up.
     Silent,
     /// It answered with a range that its data sheet does not allow.
-    Nonsense,
+    OutOfRange,
     /// The bus, or the pin, failed while the sensor was addressed.
     Bus,
     /// Its line was up before it was asked: it hangs, or the wire has a fault.
@@ -106,7 +106,7 @@ impl SonarFault {
     pub const fn kind(self) -> FaultKind {
         match self {
             Self::Silent | Self::Stuck => FaultKind::SonarSilent,
-            Self::Nonsense => FaultKind::SonarNonsense,
+            Self::OutOfRange => FaultKind::SonarOutOfRange,
             Self::Bus | Self::Clock => FaultKind::BusError,
         }
     }
@@ -116,7 +116,7 @@ impl fmt::Display for SonarError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let what = match self.fault {
             SonarFault::Silent => "did not answer in time",
-            SonarFault::Nonsense => "answered with an impossible range",
+            SonarFault::OutOfRange => "answered with an impossible range",
             SonarFault::Bus => "could not be reached: bus or pin error",
             SonarFault::Stuck => "holds its line high before it is asked",
             SonarFault::Clock => "could not be timed: the clock stands still",

@@ -57,7 +57,7 @@ impl<const SONARS: usize> Round<SONARS> {
             match outcome {
                 Ok(heard) => *echo = heard,
                 Err(fault) => {
-                    faults.count(fault.kind());
+                    faults.record(fault.kind());
                     last_error = Some(SonarError { sensor, fault });
                 }
             }

@@ -70,7 +70,7 @@ impl<const SONARS: usize> Srf08Config<SONARS> {
         }
         match u16::try_from(range_mm(flight_us.into(), self.speed_of_sound_m_per_s)) {
             Ok(range_mm) if (self.min_range_mm..=self.max_range_mm).contains(&range_mm) => Ok(Echo::Range { range_mm }),
-            _ => Err(SonarFault::Nonsense),
+            _ => Err(SonarFault::OutOfRange),
         }
     }
 }
@@ -192,7 +192,7 @@ mod tests {
         let config = Srf08Config::<16>::DEFAULT;
         assert_eq!(config.echo(0), Ok(Echo::Silence));
         for flight_us in [1, 160, 35_000, u16::MAX] {
-            assert_eq!(config.echo(flight_us), Err(SonarFault::Nonsense));
+            assert_eq!(config.echo(flight_us), Err(SonarFault::OutOfRange));
         }
     }
 

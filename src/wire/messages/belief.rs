@@ -32,7 +32,8 @@ impl Belief {
     pub fn of<const V: usize>(filter: &impl Filter<V>, place_index: u32) -> Self {
         let mut places = [PlaceProbability::default(); 8];
         for vertex in filter.map().vertices() {
-            let mut place = PlaceProbability { vertex: vertex.into(), permille: permille(filter.place_probability_q16(vertex)) };
+            let mut place =
+                PlaceProbability { vertex: vertex.into(), permille: permille(filter.place_probability_q16(vertex)) };
             for slot in &mut places {
                 if place.permille > slot.permille {
                     core::mem::swap(slot, &mut place);
@@ -109,7 +110,10 @@ impl Renamed {
         for ((before, label), row) in (0..).zip(labels_before).zip(neighbours_before) {
             let Some(now) = self.now(before) else { continue };
             let Some(slot) = neighbours.get_mut(usize::from(now)) else { continue };
-            let neighbours_now = VertexSet::from_bits(row).iter().filter_map(|other| self.now(other.into())).filter(|&now| usize::from(now) < V);
+            let neighbours_now = VertexSet::from_bits(row)
+                .iter()
+                .filter_map(|other| self.now(other.into()))
+                .filter(|&now| usize::from(now) < V);
             *slot |= neighbours_now.fold(0, |row, other| row | bit(other));
             if labelled & bit(before) != 0
                 && labelled_now & bit(now) == 0

@@ -71,20 +71,20 @@ impl Inbox {
         if self.taken >= Self::BYTES_PER_TURN {
             if self.taken == Self::BYTES_PER_TURN {
                 self.taken = self.taken.saturating_add(1);
-                self.faults.count(FaultKind::CommandFlood);
+                self.faults.record(FaultKind::CommandFlood);
             }
             return;
         }
         self.taken = self.taken.saturating_add(1);
         match self.decoder.feed(&[byte]) {
             Progress::NeedsMore => {}
-            Progress::Error { .. } => self.faults.count(FaultKind::WireCorrupt),
+            Progress::Error { .. } => self.faults.record(FaultKind::WireCorrupt),
             Progress::Message { message: request, .. } if !self.is_waiting => {
                 self.is_waiting = true;
                 self.waiting = request;
             }
             Progress::Message { message: request, .. } if self.waiting == request => {}
-            Progress::Message { .. } => self.faults.count(FaultKind::CommandFlood),
+            Progress::Message { .. } => self.faults.record(FaultKind::CommandFlood),
         }
     }
 
@@ -99,7 +99,7 @@ impl Inbox {
         if !self.has_answered || self.answered.0 != request {
             let outcome = execute(&request.command);
             if matches!(outcome, Outcome::Refused(_)) {
-                self.faults.count(FaultKind::CommandRefused);
+                self.faults.record(FaultKind::CommandRefused);
             }
             self.has_answered = true;
             self.answered = (request, outcome);

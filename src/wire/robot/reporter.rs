@@ -202,8 +202,8 @@ impl<const V: usize> Reporter<V> {
         }
         self.ticks_to_hello = self.ticks_to_hello.saturating_sub(1);
         for kind in FaultKind::ALL {
-            if self.faults.get(kind as usize) != Some(&faults.of(kind)) {
-                self.send_fault(kind, faults.of(kind), &mut send);
+            if self.faults.get(kind as usize) != Some(&faults.count(kind)) {
+                self.send_fault(kind, faults.count(kind), &mut send);
             }
         }
         for _ in 0..if self.hurries { Self::PIECES_IN_A_HURRY } else { 1 } {
@@ -231,7 +231,7 @@ impl<const V: usize> Reporter<V> {
             Some(0) => self.send_size(map, send),
             Some(1) => self.location.is_none_or(|location| self.send(&Message::Location(location), send)),
             Some(2) => self.belief.is_none_or(|belief| self.send(&Message::Belief(belief), send)),
-            Some(_) => self.next_fault(faults).is_none_or(|kind| self.send_fault(kind, faults.of(kind), send)),
+            Some(_) => self.next_fault(faults).is_none_or(|kind| self.send_fault(kind, faults.count(kind), send)),
         };
         if done {
             self.turn = if self.turn >= vertices.saturating_add(3) { 0 } else { self.turn.saturating_add(1) };
@@ -282,7 +282,7 @@ impl<const V: usize> Reporter<V> {
 
     /// The next kind of fault, in rotation, that was seen at all.
     fn next_fault(&mut self, faults: &FaultCounters) -> Option<FaultKind> {
-        let seen = |kind: &FaultKind| faults.of(*kind) > 0;
+        let seen = |kind: &FaultKind| faults.count(*kind) > 0;
         let after = FaultKind::ALL.into_iter().filter(seen).find(|&kind| kind as u8 >= self.fault_turn);
         let kind = after.or_else(|| FaultKind::ALL.into_iter().find(seen))?;
         self.fault_turn = (kind as u8).saturating_add(1);

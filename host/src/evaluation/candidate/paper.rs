@@ -97,7 +97,7 @@ impl<const N: usize, const WORDS: usize> Candidate for Online<N, WORDS> {
     }
 
     fn vertices_full(&self) -> u32 {
-        self.0.filter.faults().of(FaultKind::VerticesFull)
+        self.0.filter.faults().count(FaultKind::VerticesFull)
     }
 }
 
@@ -134,7 +134,7 @@ impl<const N: usize, const WORDS: usize> Candidate for Informed<N, WORDS> {
     }
 
     fn vertices_full(&self) -> u32 {
-        self.particles.filter.faults().of(FaultKind::VerticesFull)
+        self.particles.filter.faults().count(FaultKind::VerticesFull)
     }
 }
 

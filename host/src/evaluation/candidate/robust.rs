@@ -79,6 +79,6 @@ impl<const N: usize, const HISTORY: usize> Candidate for Robust<N, HISTORY> {
     }
 
     fn vertices_full(&self) -> u32 {
-        self.0.faults().of(FaultKind::VerticesFull)
+        self.0.faults().count(FaultKind::VerticesFull)
     }
 }

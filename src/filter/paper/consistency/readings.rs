@@ -36,7 +36,7 @@ fn range_steps(length: NgramLength, label: Fingerprint, distance: u16) -> (u16, 
 
 impl<const V: usize, const WORDS: usize, const INDICES: usize> Readings<V, WORDS, INDICES> {
     pub(super) const fn new() -> Self {
-        Self { 
+        Self {
             sets: [[PerVertex::filled(StateSet::EMPTY); PLANES]; INDICES],
             keys: [[PerVertex::filled(NOTHING); PLANES]; INDICES],
         }
