@@ -66,7 +66,7 @@ fn a_listener_has_what_the_filter_believes<F: Filter<VERTICES>>(settings: F::Con
         let Some((_, update)) = seen else { continue };
         let filter = mapper.filter();
         assert!(picture.is_converged(), "place {places}");
-        assert!(picture.edges().eq(filter.map().edges()), "place {places}");
+        assert!(picture.edges().eq(filter.map().edges().map(|(a, b)| (a.into(), b.into()))), "place {places}");
         assert_eq!(picture.location(), Some(Location::from(&update)));
         assert_eq!(picture.belief(), Some(Belief::of(filter, places)));
         assert_eq!(picture.worst(), Some(Worst::of(filter, places)));

@@ -107,11 +107,10 @@ mod tests {
     #[test]
     fn the_digest_is_the_one_that_a_robot_has_of_the_same_map() {
         let mut map: Map<8> = Map::new();
-        for radius_mm in [1200, 400, 700] {
-            map.add_vertex(toposlam::Fingerprint::from_radius_mm(radius_mm).unwrap()).unwrap();
-        }
-        map.add_edge(0, 2);
-        map.add_edge(1, 1);
+        let radius = |radius_mm| toposlam::Fingerprint::from_radius_mm(radius_mm).unwrap();
+        let [a, b, c] = [1200, 400, 700].map(|radius_mm| map.add_vertex(radius(radius_mm)).unwrap());
+        map.add_edge(a, c);
+        map.add_edge(b, b);
         assert_eq!(TopologicalMap::from(&map).digest(), toposlam::wire::map_digest(&map));
         assert_eq!(TopologicalMap::default().digest(), toposlam::wire::map_digest(&Map::<8>::new()));
     }

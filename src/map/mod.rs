@@ -7,6 +7,8 @@ mod vertex_set;
 pub use per_vertex::PerVertex;
 pub use vertex::VertexId;
 pub use vertex_set::VertexSet;
+#[allow(unused_imports)]
+pub(crate) use vertex_set::VertexSet32;
 
 use crate::Fingerprint;
 

@@ -3,7 +3,7 @@
 use toposlam::persist::snapshot::{Reader, SnapshotError, Writer};
 use toposlam::reference::VERTICES;
 use toposlam::{
-    ConfigError, FaultCounters, Filter, FilterCapacities, Map, Observation, Update, WeightFactors, WorstNgram,
+    ConfigError, FaultCounters, Filter, FilterCapacities, Map, Observation, Update, VertexId, WeightFactors, WorstNgram,
 };
 
 /// What a mapper told its filter. Started with the capacity of its history, which a snapshot of it holds; 0 is out of range.
@@ -37,7 +37,7 @@ impl Filter<VERTICES> for Notes {
         self.observations.push(observation);
         Update {
             place_index: self.observations.len() as u32 - 1,
-            vertex: 0,
+            vertex: VertexId::FIRST,
             is_new: false,
             consistency_mm: 0,
             factors: WeightFactors { ln_label_q16: 0, ln_consistency_q16: 0, ln_size_q16: 0 },
@@ -54,11 +54,11 @@ impl Filter<VERTICES> for Notes {
         &self.faults
     }
 
-    fn recent(&self, _: usize) -> Option<u8> {
+    fn recent(&self, _: usize) -> Option<VertexId> {
         None
     }
 
-    fn place_probability_q16(&self, _: u8) -> u32 {
+    fn place_probability_q16(&self, _: VertexId) -> u32 {
         0
     }
 
@@ -66,7 +66,7 @@ impl Filter<VERTICES> for Notes {
         0
     }
 
-    fn renamed(&self, before: u8) -> Option<u8> {
+    fn renamed(&self, before: VertexId) -> Option<VertexId> {
         Some(before)
     }
 

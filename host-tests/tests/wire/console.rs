@@ -111,7 +111,9 @@ impl FakeRobot {
             }
             Command::SetConfig(setting) => self.settings = self.settings.with(setting, HYPOTHESES, SONARS)?,
             Command::LocaliseOnly { on } => self.localise_only = on,
-            Command::GoTo { vertex } if vertex < self.mapper.map().vertices() => self.going_to = Some(vertex),
+            Command::GoTo { vertex } if usize::from(vertex) < self.mapper.map().vertices().len() => {
+                self.going_to = Some(vertex)
+            }
             Command::GoTo { .. } => return Err(Refusal::UnknownVertex),
             Command::Explore => self.going_to = None,
             Command::Pause { on } => self.paused = on,

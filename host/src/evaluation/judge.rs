@@ -202,7 +202,7 @@ mod tests {
 
         fn polish(&mut self, _slices: u32) {}
 
-        fn search_from(&self, _path: &[u8], _slices: u32) -> Option<(Map<VERTICES>, Vec<usize>)> {
+        fn search_from(&self, _path: &[VertexId], _slices: u32) -> Option<(Map<VERTICES>, Vec<usize>)> {
             None
         }
 
@@ -223,10 +223,9 @@ mod tests {
 
     fn oracle<const LOST_FOR: usize>(_: &Settings, trial: &Trial) -> Box<dyn Candidate> {
         let mut map = Map::new();
-        for place in trial.environment.places() {
-            map.add_vertex(Fingerprint::from_radius_mm(place.mean_mm as u16).unwrap()).unwrap();
-        }
-        trial.environment.graph().edges().iter().for_each(|&(a, b)| map.add_edge(a as u8, b as u8));
+        let radii = trial.environment.places().iter().map(|place| Fingerprint::from_radius_mm(place.mean_mm as u16));
+        let vertices: Vec<_> = radii.map(|radius| map.add_vertex(radius.unwrap()).unwrap()).collect();
+        trial.environment.graph().edges().iter().for_each(|&(a, b)| map.add_edge(vertices[a], vertices[b]));
         let places = trial.mapped_before().iter().flatten().chain(&trial.visits).map(|visit| visit.place).collect();
         Box::new(Oracle { map, places, seen: 0, lost_for: LOST_FOR })
     }
