@@ -49,8 +49,9 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 //!
-//! With the feature `wire`, `Mapper` is these stages and the sender of the serial protocol in one piece. It takes either
-//! filter, or another one that is a [`Filter`].
+//! [`Mapper`] is these stages in one piece, with the refinement of the map between two places. It takes either filter, or
+//! another one that is a [`Filter`]. The feature `wire` adds the `Reporter`, which sends what the mapper found, and the whole
+//! `Robot`.
 //!
 //! # How well a map fits
 //!
@@ -80,10 +81,10 @@
 //!
 //! | Feature | Adds |
 //! |---|---|
-//! | none | everything but the lines below: detector, filter, n-grams, consistency, drivers of the sonars |
+//! | none | detector, filters, [`Mapper`], drive, drivers of the sonars |
 //! | `snapshot` | snapshots of the map and the filter as byte strings (module `snapshot`) |
 //! | `store` | snapshots in flash, wear-levelled (module `store`) |
-//! | `wire` | the serial protocol (module `wire`) and `Mapper`, all stages in one; implies `snapshot` |
+//! | `wire` | the serial protocol (module `wire`) and the whole robot (module `robot`); implies `snapshot` |
 //! | `defmt` | `defmt::Format` for what a firmware logs |
 //! | `firmware`, `pll` | the images in `src/bin`; only for the reference board's target |
 //!
@@ -131,6 +132,7 @@
 #![cfg_attr(not(test), no_std)]
 #![forbid(unsafe_code)]
 
+mod bearing;
 #[cfg(feature = "snapshot")]
 mod checksum;
 #[cfg(feature = "defmt")]
@@ -139,7 +141,6 @@ pub mod drive;
 mod fault;
 mod filter;
 mod map;
-#[cfg(feature = "wire")]
 mod mapper;
 #[cfg(feature = "snapshot")]
 pub mod persist;
@@ -158,7 +159,6 @@ pub use filter::{
     Update, WeightFactors, WorstNgram,
 };
 pub use map::{Map, PerVertex, VertexId, VertexSet, VerticesFull};
-#[cfg(feature = "wire")]
 pub use mapper::{Mapper, MapperConfig, MapperError};
 pub use place::{Fingerprint, FingerprintError};
 

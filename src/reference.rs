@@ -15,12 +15,11 @@
 //! ```
 
 use crate::{
-    Config, Direction, PaperFilter, RobustConfig, RobustFilter, place::PlaceConfig, place::PlaceDetector,
-    ring::RingGeometry,
+    Config, Direction, Mapper, MapperConfig, PaperFilter, RobustConfig, RobustFilter, place::PlaceConfig,
+    place::PlaceDetector, ring::RingGeometry,
 };
 #[cfg(feature = "wire")]
 use crate::{
-    Mapper, MapperConfig,
     drive::DriveConfig,
     persist::snapshot::SnapshotPolicy,
     robot::{self, Robot},
@@ -61,18 +60,10 @@ pub type Detector = PlaceDetector<SONARS>;
 /// The filter of the reference robot.
 pub type Filter = RobustFilter<HYPOTHESES, VERTICES, HISTORY>;
 /// All stages of the reference robot in one.
-#[cfg(feature = "wire")]
 pub type RobotMapper = Mapper<SONARS, VERTICES, Filter>;
 /// The settings of all stages of the reference robot.
-#[cfg(feature = "wire")]
-pub const MAPPER: MapperConfig<SONARS, RobustConfig> = MapperConfig {
-    geometry: RING,
-    place: PLACE,
-    filter: FILTER,
-    seed: SEED,
-    boot: 0,
-    reset_cause: ResetCause::Unknown,
-};
+pub const MAPPER: MapperConfig<SONARS, RobustConfig> =
+    MapperConfig { geometry: RING, place: PLACE, filter: FILTER, seed: SEED };
 
 /// The whole robot: all stages, the drive and its commands.
 #[cfg(feature = "wire")]
@@ -84,6 +75,8 @@ pub const ROBOT: robot::RobotConfig<SONARS> = robot::RobotConfig {
     drive: DriveConfig::DEFAULT,
     snapshot: SnapshotPolicy::DEFAULT,
     turn_bound_ms: 1000,
+    boot: 0,
+    reset_cause: ResetCause::Unknown,
 };
 
 /// The most particles of the paper's filter, where it stands in for the reference robot's.

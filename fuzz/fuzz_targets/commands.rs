@@ -5,7 +5,8 @@ use std::sync::LazyLock;
 
 use arbitrary::Arbitrary;
 use libfuzzer_sys::fuzz_target;
-use toposlam::persist::snapshot::{FILTER_SECTION, Writer};
+use toposlam::persist::Persist;
+use toposlam::persist::snapshot::Writer;
 use toposlam::place::PlaceDetector;
 use toposlam::reference::{PLACE, RING, SONARS};
 use toposlam::wire::{
@@ -270,7 +271,7 @@ impl<'buffer> Robot<'buffer> {
             let filter = &mut self.filter;
             let taken = self.staging.take(|buffer| {
                 let mut writer = Writer::new(buffer).ok()?;
-                writer.section(FILTER_SECTION, |section| filter.save(section)).ok()?;
+                writer.stage(filter.as_mut()).ok()?;
                 writer.finish().ok()
             });
             self.expected.staged = Staged::Nothing;

@@ -5,6 +5,7 @@ use std::sync::LazyLock;
 
 use arbitrary::Arbitrary;
 use libfuzzer_sys::fuzz_target;
+use toposlam::persist::Persist;
 use toposlam::persist::snapshot::{FILTER_SECTION, SNAPSHOT_VERSION, SnapshotError, Writer};
 use toposlam::wire::crc32;
 use toposlam_fuzz::filters::{self, Seen, Small};

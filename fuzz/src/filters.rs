@@ -83,7 +83,7 @@ pub fn with_map() -> Box<Small> {
 pub fn saved(filter: &mut Small) -> Vec<u8> {
     let mut buffer = [0; Small::SNAPSHOT_BYTES];
     let mut writer = Writer::new(&mut buffer).unwrap();
-    writer.section(FILTER_SECTION, |section| filter.save(section)).expect("there is room for all of it");
+    writer.stage(filter).expect("there is room for all of it");
     let length = writer.finish().unwrap();
     buffer[..length].to_vec()
 }

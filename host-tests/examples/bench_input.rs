@@ -9,7 +9,7 @@
 use toposlam::Turn;
 use toposlam::place::Place;
 use toposlam::reference::{self, Detector};
-use toposlam_host::world::{Plan, RobotModel, Simulation};
+use toposlam_sim::world::{Plan, RobotModel, Simulation};
 
 /// As many as the history of the reference robot holds.
 const PLACES: usize = 400;

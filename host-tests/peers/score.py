@@ -1,4 +1,4 @@
-"""How right a map is. The same scores as `host/src/evaluation/score.rs`, so that peers and toposlam are comparable."""
+"""How right a map is. The same scores as `host/eval/src/score.rs`, so that peers and toposlam are comparable."""
 
 from __future__ import annotations
 

@@ -3,7 +3,7 @@
 use toposlam::Turn;
 use toposlam::reference::{self, Detector};
 use toposlam::ring::Echo;
-use toposlam_host::world::{Plan, RobotModel, SONARS, Simulation};
+use toposlam_sim::world::{Plan, RobotModel, SONARS, Simulation};
 
 const PLACES_MM: [u16; 400] = include!("../../src/bin/support/bench_places.rs");
 const HINTS: [[u8; 2]; 400] = include!("../../src/bin/support/bench_hints.rs");

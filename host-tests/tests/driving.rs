@@ -2,8 +2,9 @@
 
 use toposlam::Turn;
 use toposlam::reference::SNAPSHOT_BYTES;
-use toposlam_host::exploration::Exploration;
-use toposlam_host::world::{Plan, Report, RobotModel, SonarModel};
+use toposlam_eval::mapping::score_exploration;
+use toposlam_sim::exploration::Exploration;
+use toposlam_sim::world::{Plan, Report, RobotModel, SonarModel};
 
 /// How an exploration went.
 struct Outcome {
@@ -33,7 +34,7 @@ fn explore(plan: &str, sonar: SonarModel, seed: u64, places: usize) -> Outcome {
         told = exploration.robot().drive().turn();
     }
     let report = exploration.journal().report();
-    Outcome { report, touched: exploration.rover().bumps(), turns, located: exploration.score().location }
+    Outcome { report, touched: exploration.rover().bumps(), turns, located: score_exploration(&exploration).location }
 }
 
 #[test]

@@ -4,13 +4,15 @@ mod common;
 
 use common::notes::Notes;
 use toposlam::reference::{self, PaperReference, SONARS, VERTICES};
-use toposlam::wire::{Arrival, Belief, Header, Location, Message, Picture, ResetCause, Worst};
+use toposlam::wire::{
+    Arrival, Belief, Capacities, Header, Hello, Location, Message, Picture, Reporter, ResetCause, Worst,
+};
 use toposlam::{FaultCounters, Filter, Mapper, MapperConfig, Observation, Turn};
-use toposlam_host::world::{Plan, RobotModel, Simulation};
+use toposlam_sim::world::{Plan, RobotModel, Simulation};
 
 fn config<C>(filter: C) -> MapperConfig<SONARS, C> {
     let (geometry, place) = (reference::RING, reference::PLACE);
-    MapperConfig { geometry, place, filter, seed: 1, boot: 0, reset_cause: ResetCause::Unknown }
+    MapperConfig { geometry, place, filter, seed: 1 }
 }
 
 fn simulation() -> Simulation {
@@ -23,15 +25,8 @@ fn the_filter_hears_of_radius_degree_and_turn() {
     assert!(mapper.start(&config(0)).is_err());
     mapper.start(&config(99)).unwrap();
     let mut expected = Vec::new();
-    let mut hello = None;
     for (frame, truth) in simulation() {
-        let send = |message: &Message| {
-            if let Message::Hello(said) = message {
-                hello = Some(*said);
-            }
-            Ok(())
-        };
-        if let Some((place, _)) = mapper.observe(&frame, truth.turn, &FaultCounters::new(), send) {
+        if let Some((place, _)) = mapper.observe(&frame, truth.turn) {
             expected.push(Observation {
                 fingerprint: place.fingerprint,
                 turn: truth.turn,
@@ -46,7 +41,7 @@ fn the_filter_hears_of_radius_degree_and_turn() {
     assert_eq!(mapper.filter().observations, expected);
     assert!(expected.iter().any(|observation| observation.turn == Some(Turn::Back)));
     assert!(expected.iter().any(|observation| observation.degree == Some(3)));
-    let capacities = hello.unwrap().capacities;
+    let capacities = Capacities::of_mapper::<SONARS, VERTICES, Notes>(&config(99));
     assert_eq!((capacities.hypotheses, capacities.history, capacities.ngram_length), (7, 99, 3));
 }
 
@@ -54,11 +49,15 @@ fn the_filter_hears_of_radius_degree_and_turn() {
 fn a_listener_has_what_the_filter_believes<F: Filter<VERTICES>>(settings: F::Config) {
     let mut mapper = Box::new(Mapper::<SONARS, VERTICES, F>::new());
     mapper.start(&config(settings)).unwrap();
+    let mut reporter = Reporter::new();
+    let capacities = Capacities::of_mapper::<SONARS, VERTICES, F>(&config(settings));
+    reporter.start(Hello::new(0, ResetCause::Unknown, 1, capacities), 100);
     let mut picture = Picture::<VERTICES>::new();
     let mut sequence = 0;
     let mut places = 0;
     for (frame, truth) in simulation() {
-        let seen = mapper.observe(&frame, truth.turn, &FaultCounters::new(), |message| {
+        let seen = mapper.observe(&frame, truth.turn);
+        reporter.report(&mapper, seen.as_ref(), &FaultCounters::new(), |message: &Message| {
             picture.apply(Header { sequence, arrival: Arrival::InOrder }, message);
             sequence = sequence.wrapping_add(1);
             Ok(())

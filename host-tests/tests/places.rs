@@ -9,8 +9,8 @@ use toposlam::place::{Place, PlaceConfig, PlaceDetector};
 use toposlam::reference;
 use toposlam::ring::{Echo, RingFrame};
 use toposlam::{FaultKind, Turn};
-use toposlam_host::recording::Ring;
-use toposlam_host::world::{Journal, Plan, Report, RobotModel, SONARS, Simulation, SonarModel};
+use toposlam_eval::recording::Ring;
+use toposlam_sim::world::{Journal, Plan, Report, RobotModel, SONARS, Simulation, SonarModel};
 
 /// Drives until so many nodes were visited.
 fn drive(plan: &str, model: RobotModel, seed: u64, visits: usize) -> (Report, Vec<Place>) {
@@ -113,7 +113,7 @@ fn the_real_recording_gives_places_whose_radius_fits_its_room() {
         let _ = writeln!(std::io::stderr(), "SKIPPED: no recording at ../shared/data/scitos-g5");
         return;
     };
-    let ring = Ring::parse(include_str!("../../host/rings/scitos-g5.toml")).unwrap();
+    let ring = Ring::parse(include_str!("../../host/eval/rings/scitos-g5.toml")).unwrap();
     let frames = ring.read(recording).unwrap();
     assert_eq!(frames.len(), 5456);
     let mut detector = PlaceDetector::new();

@@ -1,6 +1,6 @@
 """How fast a stream is decoded here: `python python/examples/decode_rate.py FILE`, with a file of raw bytes.
 
-`cargo run --release -p toposlam-host --example decode_rate -- FILE` writes one, and measures the same in Rust.
+`cargo run --release -p toposlam-link --example decode_rate -- FILE` writes one, and measures the same in Rust.
 """
 
 from __future__ import annotations

@@ -24,6 +24,7 @@ use static_cell::ConstStaticCell;
 use toposlam::{
     FaultCounters, Filter as _, Fingerprint, Observation, RobustConfig, RobustFilter, Turn, Update,
     drive::{Drive, VelocityCommand},
+    persist::Persist,
     persist::snapshot::Writer,
     reference::{
         self, Detector, Filter, HISTORY, PaperReference, ReferenceRobot, RobotMapper, SNAPSHOT_BYTES, SONARS, VERTICES,

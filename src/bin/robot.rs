@@ -28,10 +28,10 @@ use stm32f4xx_hal::{
     watchdog::IndependentWatchdog,
 };
 use toposlam::{
-    FaultCounters, MapperConfig,
+    FaultCounters,
     drive::{DifferentialDrive, VelocityCommand, WheelsConfig},
     persist::store::{BootPolicy, Store},
-    reference::{MAPPER, ROBOT, ReferenceRobot, SNAPSHOT_BYTES, SONARS, STORE},
+    reference::{ROBOT, ReferenceRobot, SNAPSHOT_BYTES, SONARS, STORE},
     ring::drivers::{Sc18im700, SonarRing, Srf08Config, Srf08Ring},
     robot::{Board, KeepError, RobotConfig},
     wire::{QueueFull, ResetCause},
@@ -138,7 +138,7 @@ fn main() -> ! {
     let flash = FLASH.init(LockedFlash::new(device.FLASH));
     let mut store = if is_emulated { None } else { Store::mount(flash.unlocked(), STORE).ok() };
     let boot = store.as_mut().and_then(|store| store.count_start().ok()).unwrap_or(0);
-    let config = RobotConfig { mapper: MapperConfig { boot, reset_cause, ..MAPPER }, ..ROBOT };
+    let config = RobotConfig { boot, reset_cause, ..ROBOT };
     let robot = ROBOT_CELL.take();
     let started = match &mut store {
         Some(store) => robot.boot(&config, SNAPSHOT.take(), store, BootPolicy::default()).map(|_| ()),

@@ -1,9 +1,7 @@
 //! What the drive did at each place of the history, and what that tells of the ways of a vertex.
 
-use super::pilot::WaysOut;
+use super::local_planner::Exits;
 use crate::map::PerVertex;
-#[cfg(feature = "snapshot")]
-use crate::persist::snapshot::{Reader, SnapshotError, Writer};
 use crate::{Filter, VertexId};
 
 /// A place has at most so many ways; the seventh and eighth have no room in the note of a place.
@@ -29,6 +27,12 @@ pub(super) struct Way {
     pub(super) uses: u16,
 }
 
+/// Whether a byte is the note of a place: the number of the way is below the number of ways.
+#[cfg(feature = "snapshot")]
+pub(crate) fn is_departure(note: u8) -> bool {
+    note == 0 || note >> EXIT_SHIFT < note & COUNT_MASK
+}
+
 impl<const HISTORY: usize> Departures<HISTORY> {
     pub(super) const fn new() -> Self {
         Self { notes: [0; HISTORY], places: 0 }
@@ -45,8 +49,8 @@ impl<const HISTORY: usize> Departures<HISTORY> {
     }
 
     /// The robot leaves the newest place by this way.
-    pub(super) fn depart(&mut self, ways: WaysOut, exit: u8) {
-        let known = ways.came_by_first && usize::from(ways.count) <= WAYS && exit < ways.count;
+    pub(super) fn depart(&mut self, ways: Exits, exit: u8) {
+        let known = ways.is_entry_first && usize::from(ways.count) <= WAYS && exit < ways.count;
         self.note(if known { ways.count | exit << EXIT_SHIFT } else { 0 });
     }
 
@@ -55,43 +59,21 @@ impl<const HISTORY: usize> Departures<HISTORY> {
         self.note(0);
     }
 
-    /// The notes of the places that are remembered, the oldest first: their number and one byte each.
+    /// The notes of the places that are remembered, the oldest first.
     #[cfg(feature = "snapshot")]
-    pub(super) fn save(&self, writer: &mut Writer<'_>) -> Result<(), SnapshotError> {
+    pub(super) fn iter(&self) -> impl ExactSizeIterator<Item = u8> + '_ {
         let remembered = (self.places as usize).min(HISTORY);
-        writer.u16(remembered as u16)?;
-        for ago in (0..remembered).rev() {
-            writer.u8(self.notes.get(self.slot(ago)).copied().unwrap_or(0))?;
-        }
-        Ok(())
+        (0..remembered).rev().map(|ago| self.notes.get(self.slot(ago)).copied().unwrap_or(0))
     }
 
-    /// Whether notes make sense.
+    /// Replaces all notes by others, the oldest first.
     #[cfg(feature = "snapshot")]
-    pub(super) fn check(mut section: Reader<'_>) -> Result<(), SnapshotError> {
-        let remembered = section.u16()?;
-        if usize::from(remembered) > HISTORY {
-            return Err(SnapshotError::Capacities);
-        }
-        for _ in 0..remembered {
-            let note = section.u8()?;
-            if note != 0 && note >> EXIT_SHIFT >= note & COUNT_MASK {
-                return Err(SnapshotError::Contents);
-            }
-        }
-        section.finish()
-    }
-
-    #[cfg(feature = "snapshot")]
-    pub(super) fn restore(&mut self, mut section: Reader<'_>) -> Result<(), SnapshotError> {
-        Self::check(section)?;
+    pub(super) fn replace(&mut self, notes: impl Iterator<Item = u8>) {
         self.clear();
-        for _ in 0..section.u16()? {
-            let note = section.u8()?;
+        for note in notes {
             self.arrive();
             self.note(note);
         }
-        Ok(())
     }
 
     fn note(&mut self, note: u8) {

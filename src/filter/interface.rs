@@ -2,8 +2,6 @@
 
 use super::robust::NGRAM_LENGTH;
 use super::{ConfigError, PaperFilter, RobustConfig, RobustFilter, Update, WorstNgram};
-#[cfg(feature = "snapshot")]
-use crate::persist::snapshot::{Reader, SnapshotError, Writer};
 use crate::{Config, FaultCounters, Map, Observation, VertexId};
 
 /// What a filter with some settings has room for.
@@ -76,28 +74,6 @@ pub trait Filter<const V: usize>: Sized {
     fn is_in_doubt(&self) -> bool {
         false
     }
-
-    /// Writes what the filter knows, as much of it as there is room for, and brings the filter itself into the state that
-    /// [`Filter::restore`] makes of it.
-    ///
-    /// # Errors
-    /// [`SnapshotError::Full`]; [`SnapshotError::Unsupported`] for a filter that cannot be saved, as it is without an
-    /// implementation of its own.
-    #[cfg(feature = "snapshot")]
-    fn save(&mut self, writer: &mut Writer<'_>) -> Result<(), SnapshotError> {
-        let _ = writer;
-        Err(SnapshotError::Unsupported)
-    }
-
-    /// Goes on with what was written by [`Filter::save`], settings and seed included; faults are counted from 0.
-    ///
-    /// # Errors
-    /// [`SnapshotError`] says what is wrong with it; the filter then goes on as it was.
-    #[cfg(feature = "snapshot")]
-    fn restore(&mut self, reader: Reader<'_>) -> Result<(), SnapshotError> {
-        let _ = reader;
-        Err(SnapshotError::Unsupported)
-    }
 }
 
 impl<const N: usize, const V: usize, const HISTORY: usize> Filter<V> for RobustFilter<N, V, HISTORY> {
@@ -160,22 +136,12 @@ impl<const N: usize, const V: usize, const HISTORY: usize> Filter<V> for RobustF
     fn is_in_doubt(&self) -> bool {
         self.is_in_doubt()
     }
-
-    #[cfg(feature = "snapshot")]
-    fn save(&mut self, writer: &mut Writer<'_>) -> Result<(), SnapshotError> {
-        self.save(writer)
-    }
-
-    #[cfg(feature = "snapshot")]
-    fn restore(&mut self, reader: Reader<'_>) -> Result<(), SnapshotError> {
-        self.restore(reader)
-    }
 }
 
 /// The paper's filter reads the fingerprint alone. Its best particle is certain of its place, and the share of the draws
 /// that chose it stands for the probability of its map. It remembers no path, only where it is. Vertices keep their numbers
 /// within a particle and mean nothing in another one, so no vertex is told to be another. It knows how far its map is from the
-/// history, not which n-gram is. It cannot be saved.
+/// history, not which n-gram is.
 impl<const N: usize, const V: usize, const WORDS: usize> Filter<V> for PaperFilter<N, V, WORDS> {
     type Config = Config;
 

@@ -1,10 +1,10 @@
 //! What the robot does when it is told something.
 
-use super::{Board, Line, RECEIVED_PER_TURN, Robot, restore, snapshot};
+use super::{Board, FRAMES_PER_HELLO, Line, RECEIVED_PER_TURN, Robot, restore, snapshot};
 use crate::drive::{self, Goal};
 use crate::persist::snapshot::Resume;
 use crate::wire::{Command, Info, Journey, JourneyState, Message, Outcome, Refusal, Setting, Settings, Version};
-use crate::{FaultKind, VertexId};
+use crate::{FaultKind, RobustFilter, VertexId};
 
 /// No way to a vertex was told of.
 pub(super) const NOTHING: (Goal, drive::GoalStatus) = (Goal::Explore, drive::GoalStatus::Inactive);
@@ -30,7 +30,7 @@ impl<const SONARS: usize, const N: usize, const V: usize, const HISTORY: usize> 
     fn execute(&mut self, command: &Command, board: &mut impl Board) -> Result<Outcome, Refusal> {
         match *command {
             Command::Info => return Ok(Outcome::Info(self.info(board))),
-            Command::GetMap => self.mapper.hurry(),
+            Command::GetMap => self.reporter.send_full(),
             Command::GetSnapshot { offset } => {
                 if offset == 0 {
                     let Self { mapper, drive, staging, .. } = self;
@@ -61,8 +61,8 @@ impl<const SONARS: usize, const N: usize, const V: usize, const HISTORY: usize> 
         };
         Info {
             version: Version::LIBRARY,
-            boot: self.config.mapper.boot,
-            reset_cause: self.config.mapper.reset_cause,
+            boot: self.config.boot,
+            reset_cause: self.config.reset_cause,
             uptime_ms: board.now_ms(),
             paused: self.paused,
             localise_only: self.localise_only,
@@ -76,20 +76,22 @@ impl<const SONARS: usize, const N: usize, const V: usize, const HISTORY: usize> 
     fn restore_staged(&mut self, board: &mut impl Board) -> Result<(), Refusal> {
         let Self { mapper, drive, staging, encoder, faults, .. } = self;
         let bytes = staging.commit()?;
-        if restore(mapper, drive, bytes, Resume::Elsewhere).is_err() {
+        if restore(mapper, drive, bytes, Resume::AtUnknownVertex).is_err() {
             faults.record(FaultKind::SnapshotRejected);
             return Err(Refusal::BadSnapshot);
         }
         let mut line = Line { encoder, faults, board };
-        self.mapper.retell(|message| line.send(message));
+        self.reporter.resync(|message| line.send(message));
         self.localise_only = self.mapper.filter().is_localise_only();
         Ok(())
     }
 
     fn reset(&mut self, board: &mut impl Board) -> Result<(), Refusal> {
-        let Self { mapper, drive, config, encoder, faults, .. } = self;
+        let Self { mapper, reporter, drive, config, encoder, faults, .. } = self;
         let mut line = Line { encoder, faults, board };
-        mapper.reset(&config.mapper, |message| line.send(message)).map_err(|_| Refusal::OutOfRange)?;
+        reporter.forget(|message| line.send(message));
+        mapper.start(&config.mapper).map_err(|_| Refusal::OutOfRange)?;
+        reporter.start(config.hello::<V, RobustFilter<N, V, HISTORY>>(), FRAMES_PER_HELLO);
         drive.start(config.drive, config.mapper.seed).map_err(|_| Refusal::OutOfRange)?;
         self.localise_only = false;
         self.times_lost = 0;

@@ -57,12 +57,15 @@ pub use board::{Board, KeepError};
 pub use config::{RobotConfig, RobotError};
 
 use crate::drive::{Drive, Goal, GoalStatus, VelocityCommand};
-use crate::persist::snapshot::{DRIVE_SECTION, Resume, Snapshot, SnapshotError, SnapshotPolicy, Writer};
+use crate::persist::Persist;
+use crate::persist::snapshot::{Resume, Snapshot, SnapshotError, SnapshotPolicy, Writer};
 use crate::place::Place;
 use crate::ring::RingFrame;
-use crate::wire::{self, Echoes, Encoder, Health, Inbox, MAX_FRAME_BYTES, Message, QueueFull, Staging};
+use crate::wire::{self, Echoes, Encoder, Health, Inbox, MAX_FRAME_BYTES, Message, QueueFull, Reporter, Staging};
 use crate::{FaultCounters, FaultKind, Mapper, RobustFilter, Update};
 
+/// How often the robot sends a `Hello`, in ring frames.
+const FRAMES_PER_HELLO: u16 = 100;
 /// How often the robot says how it is doing, in turns of the loop.
 const TURNS_PER_HEALTH: u32 = 256;
 /// More bytes than the inbox looks at in a turn: what a receive buffer may hold.
@@ -80,6 +83,7 @@ pub type Seen = Option<(Place, Update)>;
 pub struct Robot<'buffer, const SONARS: usize, const N: usize, const V: usize, const HISTORY: usize> {
     config: RobotConfig<SONARS>,
     mapper: Mapper<SONARS, V, RobustFilter<N, V, HISTORY>>,
+    reporter: Reporter<V>,
     drive: Drive<V, HISTORY>,
     inbox: Inbox,
     staging: Staging<'buffer>,
@@ -107,6 +111,7 @@ impl<'buffer, const SONARS: usize, const N: usize, const V: usize, const HISTORY
         Self {
             config: RobotConfig::UNSET,
             mapper: Mapper::new(),
+            reporter: Reporter::new(),
             drive: Drive::new(),
             inbox: Inbox::new(),
             staging: Staging::without_buffer(),
@@ -133,6 +138,7 @@ impl<'buffer, const SONARS: usize, const N: usize, const V: usize, const HISTORY
         self.mapper.start(&config.mapper).map_err(RobotError::Mapper)?;
         self.drive.start(config.drive, config.mapper.seed).map_err(RobotError::Drive)?;
         self.config = *config;
+        self.reporter.start(config.hello::<V, RobustFilter<N, V, HISTORY>>(), FRAMES_PER_HELLO);
         self.inbox = Inbox::new();
         self.staging = Staging::new(buffer);
         self.faults = FaultCounters::new();
@@ -190,7 +196,8 @@ impl<'buffer, const SONARS: usize, const N: usize, const V: usize, const HISTORY
         board: &mut impl Board,
     ) -> (Seen, VelocityCommand) {
         let mut line = Line { encoder: &mut self.encoder, faults: &mut self.faults, board };
-        let seen = self.mapper.observe(frame, self.drive.turn(), faults, |message| line.send(message));
+        let seen = self.mapper.observe(frame, self.drive.turn());
+        self.reporter.report(&self.mapper, seen.as_ref(), faults, |message| line.send(message));
         let seen_now = seen.as_ref().map(|(place, update)| (place, update));
         let velocity = self.drive.advance(self.mapper.detector(), self.mapper.filter(), seen_now);
         if self.drive.holds_place() {
@@ -210,7 +217,7 @@ impl<'buffer, const SONARS: usize, const N: usize, const V: usize, const HISTORY
     /// A robot that is paused still says what it knows.
     fn stand(&mut self, faults: &FaultCounters, board: &mut impl Board) -> (Seen, VelocityCommand) {
         let mut line = Line { encoder: &mut self.encoder, faults: &mut self.faults, board };
-        self.mapper.tick(faults, |message| line.send(message));
+        self.reporter.report(&self.mapper, None, faults, |message| line.send(message));
         (None, VelocityCommand::STOP)
     }
 
@@ -341,29 +348,36 @@ impl<BOARD: Board> Line<'_, BOARD> {
     }
 }
 
-/// Writes a whole snapshot: the drive's section, and the mapper's in the room that is left.
+/// Writes a whole snapshot: the drive's section, then the mapper's in the remaining room.
 fn snapshot<const SONARS: usize, const N: usize, const V: usize, const HISTORY: usize>(
     mapper: &mut Mapper<SONARS, V, RobustFilter<N, V, HISTORY>>,
-    drive: &Drive<V, HISTORY>,
+    drive: &mut Drive<V, HISTORY>,
     buffer: &mut [u8],
 ) -> Result<usize, SnapshotError> {
     let mut writer = Writer::new(buffer)?;
-    writer.section(DRIVE_SECTION, |section| drive.save(section))?;
+    writer.stage(drive)?;
     mapper.save(&mut writer)?;
     writer.finish()
 }
 
-/// Goes on with a snapshot. One without a section of the drive's is of a robot that was driven by hand.
+/// Restores a snapshot. One without the drive's section is of a robot that was driven by hand.
 fn restore<const SONARS: usize, const N: usize, const V: usize, const HISTORY: usize>(
     mapper: &mut Mapper<SONARS, V, RobustFilter<N, V, HISTORY>>,
     drive: &mut Drive<V, HISTORY>,
     bytes: &[u8],
     resume: Resume,
 ) -> Result<(), SnapshotError> {
-    let section = Snapshot::open(bytes)?.section(DRIVE_SECTION);
+    let section = Snapshot::open(bytes)?.section(Drive::<V, HISTORY>::SECTION);
     if let Some(section) = section {
-        Drive::<V, HISTORY>::check(section)?;
+        drive.check(section)?;
     }
     mapper.restore(bytes, resume)?;
-    drive.restore(section, resume)
+    match section {
+        Some(section) => drive.restore(section)?,
+        None => drive.resume(core::iter::empty()),
+    }
+    if resume == Resume::AtUnknownVertex {
+        drive.kidnapped();
+    }
+    Ok(())
 }

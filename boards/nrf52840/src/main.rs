@@ -29,10 +29,10 @@ use nrf52840_hal::{
 };
 use static_cell::ConstStaticCell;
 use toposlam::{
-    FaultCounters, MapperConfig,
+    FaultCounters,
     drive::{DifferentialDrive, VelocityCommand, WheelsConfig},
     persist::store::{BootPolicy, Store},
-    reference::{MAPPER, ROBOT, ReferenceRobot, SNAPSHOT_BYTES, SONARS},
+    reference::{ROBOT, ReferenceRobot, SNAPSHOT_BYTES, SONARS},
     ring::drivers::{SonarRing, Srf08Config, Srf08Ring},
     robot::{Board, KeepError, RobotConfig},
     wire::{QueueFull, ResetCause},
@@ -126,7 +126,7 @@ fn main() -> ! {
     let range = 0..pages.len() as u32;
     let mut store = Store::mount(Nvmc::new(device.NVMC, pages), range).ok();
     let boot = store.as_mut().and_then(|store| store.count_start().ok()).unwrap_or(0);
-    let config = RobotConfig { mapper: MapperConfig { boot, reset_cause, ..MAPPER }, ..ROBOT };
+    let config = RobotConfig { boot, reset_cause, ..ROBOT };
     let robot = ROBOT_CELL.take();
     let started = match &mut store {
         Some(store) => robot.boot(&config, SNAPSHOT.take(), store, BootPolicy::default()).map(|_| ()),

@@ -1,15 +1,15 @@
 //! Small environments for the tests of the robust filter.
 
-use toposlam_host::evaluation::environment::{Environment, Place};
+use toposlam_eval::environment::{Environment, Place};
 
 /// Six rooms, two of which look alike: Fig. 1(b) of the paper.
 pub fn six_rooms() -> Environment {
-    include_str!("../../../host/environments/table-i.toml").parse().expect("a shipped environment")
+    include_str!("../../../host/eval/environments/table-i.toml").parse().expect("a shipped environment")
 }
 
 /// Eleven places with the labels of Table II, among them aliases within the noise.
 pub fn floor() -> Environment {
-    include_str!("../../../host/environments/wean-surrogate-sd.toml").parse().expect("a shipped environment")
+    include_str!("../../../host/eval/environments/wean-surrogate-sd.toml").parse().expect("a shipped environment")
 }
 
 /// A ring of eight places in which the same three rooms follow each other twice: a b c d a b c e.

@@ -1,5 +1,6 @@
 //! A filter that maps nothing and notes what it is told.
 
+use toposlam::persist::Persist;
 use toposlam::persist::snapshot::{Reader, SnapshotError, Writer};
 use toposlam::reference::VERTICES;
 use toposlam::{
@@ -73,15 +74,23 @@ impl Filter<VERTICES> for Notes {
     fn worst(&self) -> WorstNgram {
         WorstNgram::NONE
     }
+}
+
+impl Persist for Notes {
+    const SECTION: u8 = 1;
 
     fn save(&mut self, writer: &mut Writer<'_>) -> Result<(), SnapshotError> {
         writer.u16(self.history)
     }
 
-    fn restore(&mut self, mut reader: Reader<'_>) -> Result<(), SnapshotError> {
-        let history = reader.u16()?;
-        reader.finish()?;
-        self.history = history;
+    fn check(&mut self, mut section: Reader<'_>) -> Result<(), SnapshotError> {
+        section.u16()?;
+        section.finish()
+    }
+
+    fn restore(&mut self, mut section: Reader<'_>) -> Result<(), SnapshotError> {
+        self.check(section)?;
+        self.history = section.u16()?;
         Ok(())
     }
 }

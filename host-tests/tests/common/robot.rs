@@ -3,9 +3,7 @@
 use super::drive::Random;
 use std::collections::BTreeSet;
 use toposlam::{Fingerprint, Observation, RobustFilter, Turn};
-use toposlam_host::evaluation::{
-    environment::Environment, equivalence::SmallestEquivalent, graph::Graph, score::score_map,
-};
+use toposlam_eval::{environment::Environment, equivalence::SmallestEquivalent, graph::Graph, score::score_map};
 
 /// What the robot tells besides fingerprints, and how often that is missing or wrong.
 #[derive(Clone, Copy, Debug, Default)]

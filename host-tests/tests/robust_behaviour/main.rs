@@ -12,8 +12,8 @@ use common::environments::{easy, floor, ring_with_a_repeated_part, six_rooms};
 use common::robot::{Hints, Robot, TURNS};
 use common::vertex;
 use toposlam::{FaultKind, Fingerprint, Map, Observation, RobustConfig, RobustFilter, Turn, VertexId};
-use toposlam_host::evaluation::environment::Environment;
-use toposlam_host::evaluation::walk::all_walks;
+use toposlam_eval::environment::Environment;
+use toposlam_eval::walk::all_walks;
 
 /// Moves in the time between two places.
 const POLISH: usize = 4;

@@ -10,6 +10,7 @@ mod specification;
 use common::environments::{easy, floor, six_rooms};
 use common::robot::{Hints, Robot};
 use common::vertex;
+use toposlam::persist::Persist;
 use toposlam::persist::snapshot::{FILTER_SECTION, Reader, Snapshot, SnapshotError, Writer};
 use toposlam::{Fingerprint, Map, Observation, RobustConfig, RobustFilter, Update, VertexId};
 
@@ -94,7 +95,7 @@ fn held<const N: usize, const V: usize, const T: usize>(filter: &RobustFilter<N,
 
 /// Drives of all kinds; the histories of the filters are shorter.
 fn drives(places: usize) -> Vec<Drive> {
-    let walk = |environment: &toposlam_host::evaluation::environment::Environment, hints, seed, carried: &[usize]| {
+    let walk = |environment: &toposlam_eval::environment::Environment, hints, seed, carried: &[usize]| {
         let mut robot = Robot::new(environment, hints, seed);
         (0..places)
             .map(|index| {
@@ -139,7 +140,7 @@ fn saved<const N: usize, const V: usize, const T: usize>(
 ) -> Result<Vec<u8>, SnapshotError> {
     let mut buffer = vec![0; room];
     let mut writer = Writer::new(&mut buffer)?;
-    writer.section(FILTER_SECTION, |section| filter.save(section))?;
+    writer.stage(filter)?;
     let length = writer.finish()?;
     buffer.truncate(length);
     Ok(buffer)

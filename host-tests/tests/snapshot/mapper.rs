@@ -1,23 +1,16 @@
 //! A mapper in a snapshot: with other sections, and with the next place where it should be.
 
 use toposlam::persist::snapshot::{Resume, Snapshot, SnapshotError, Writer};
-use toposlam::reference::{self, PaperReference, SONARS, VERTICES};
-use toposlam::wire::{ResetCause, map_digest};
-use toposlam::{FaultCounters, Filter, Mapper, MapperConfig};
-use toposlam_host::world::{Plan, RobotModel, Simulation};
+use toposlam::reference::{self, SONARS, VERTICES};
+use toposlam::wire::map_digest;
+use toposlam::{Filter, Mapper, MapperConfig};
+use toposlam_sim::world::{Plan, RobotModel, Simulation};
 
 use super::common::notes::Notes;
 
 fn started<F: Filter<VERTICES>>(filter: F::Config) -> Box<Mapper<SONARS, VERTICES, F>> {
     let mut mapper = Box::new(Mapper::new());
-    let config = MapperConfig {
-        geometry: reference::RING,
-        place: reference::PLACE,
-        filter,
-        seed: 1,
-        boot: 0,
-        reset_cause: ResetCause::Unknown,
-    };
+    let config = MapperConfig { geometry: reference::RING, place: reference::PLACE, filter, seed: 1 };
     mapper.start(&config).unwrap();
     mapper
 }
@@ -27,7 +20,7 @@ fn drive<F: Filter<VERTICES>>(mapper: &mut Mapper<SONARS, VERTICES, F>, simulati
     let mut seen = 0;
     while seen < places {
         let (frame, truth) = simulation.next().unwrap();
-        let place = mapper.observe(&frame, truth.turn, &FaultCounters::new(), |_| Ok(()));
+        let place = mapper.observe(&frame, truth.turn);
         seen += usize::from(place.is_some());
     }
 }
@@ -45,7 +38,7 @@ fn begins_of(mapper: &Mapper<SONARS, VERTICES, Notes>) -> Vec<bool> {
 fn the_next_place_begins_a_sequence_when_the_robot_may_be_elsewhere() {
     let mut buffer = [0; 64];
     let length = started::<Notes>(5).snapshot(&mut buffer).unwrap();
-    for (resume, begins) in [(Resume::Elsewhere, true), (Resume::InPlace, false)] {
+    for (resume, begins) in [(Resume::AtUnknownVertex, true), (Resume::InPlace, false)] {
         let mut mapper = started::<Notes>(9);
         mapper.restore(&buffer[..length], resume).unwrap();
         assert_eq!(mapper.filter().history, 5);
@@ -54,16 +47,9 @@ fn the_next_place_begins_a_sequence_when_the_robot_may_be_elsewhere() {
     }
     // Refused bytes and a new start leave nothing behind.
     let mut mapper = started::<Notes>(9);
-    assert_eq!(mapper.restore(&buffer[..length - 1], Resume::Elsewhere), Err(SnapshotError::TooShort));
-    mapper.restore(&buffer[..length], Resume::Elsewhere).unwrap();
-    let config = MapperConfig {
-        geometry: reference::RING,
-        place: reference::PLACE,
-        filter: 9,
-        seed: 1,
-        boot: 0,
-        reset_cause: ResetCause::Unknown,
-    };
+    assert_eq!(mapper.restore(&buffer[..length - 1], Resume::AtUnknownVertex), Err(SnapshotError::TooShort));
+    mapper.restore(&buffer[..length], Resume::AtUnknownVertex).unwrap();
+    let config = MapperConfig { geometry: reference::RING, place: reference::PLACE, filter: 9, seed: 1 };
     mapper.start(&config).unwrap();
     drive(&mut mapper, &mut simulation(), 1);
     assert_eq!((begins_of(&mapper), mapper.filter().history), (vec![false], 9));
@@ -99,20 +85,10 @@ fn a_robot_that_is_restored_in_the_middle_of_its_drive_ends_with_the_same_map() 
     assert_eq!(map_digest(restored.map()), map_digest(mapper.map()));
     for (frame, truth) in simulation.take(4000) {
         for mapper in [&mut mapper, &mut restored] {
-            mapper.observe(&frame, truth.turn, &FaultCounters::new(), |_| Ok(()));
+            mapper.observe(&frame, truth.turn);
         }
     }
     assert_eq!(map_digest(restored.map()), map_digest(mapper.map()));
     assert_eq!(restored.filter().observed(), mapper.filter().observed());
     assert!(restored.filter().observed() > 50);
-}
-
-#[test]
-fn the_paper_s_filter_says_that_it_cannot_be_saved() {
-    let mut buffer = [0; reference::SNAPSHOT_BYTES];
-    let mut mapper = started::<PaperReference>(reference::PAPER_FILTER);
-    assert_eq!(mapper.snapshot(&mut buffer), Err(SnapshotError::Unsupported));
-    let mut robust = started::<reference::Filter>(reference::FILTER);
-    let length = robust.snapshot(&mut buffer).unwrap();
-    assert_eq!(mapper.restore(&buffer[..length], Resume::InPlace), Err(SnapshotError::Unsupported));
 }

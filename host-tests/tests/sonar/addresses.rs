@@ -9,7 +9,7 @@ use toposlam::{
         change_srf08_address,
     },
 };
-use toposlam_host::chip::{I2cBus, MaxBotixBank, SensorFault, SimulatedTime, Srf08Bank};
+use toposlam_sim::chip::{I2cBus, MaxBotixBank, SensorFault, SimulatedTime, Srf08Bank};
 
 use crate::{Waited, world, world_frame};
 

@@ -12,7 +12,7 @@ use toposlam::{
     },
     ring::{Echo, RingFrame},
 };
-use toposlam_host::chip::{HcSr04Bank, HcSr04Fault, I2cBus, MaxBotixBank, SensorFault, SimulatedTime, Srf08Bank};
+use toposlam_sim::chip::{HcSr04Bank, HcSr04Fault, I2cBus, MaxBotixBank, SensorFault, SimulatedTime, Srf08Bank};
 
 use crate::{Waited, without, world, world_frame};
 

@@ -3,7 +3,7 @@
 use embedded_hal::i2c::I2c;
 use embedded_hal_nb::{nb, serial};
 use toposlam::ring::drivers::{BridgeError, Sc18im700};
-use toposlam_host::chip;
+use toposlam_sim::chip;
 
 use crate::link::{Link, NoError};
 

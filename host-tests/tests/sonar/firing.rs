@@ -7,7 +7,7 @@ use toposlam::{
     },
     ring::{Echo, RingFrame},
 };
-use toposlam_host::chip::{HcSr04Bank, I2cBus, MaxBotixBank, SimulatedTime, Srf08Bank};
+use toposlam_sim::chip::{HcSr04Bank, I2cBus, MaxBotixBank, SimulatedTime, Srf08Bank};
 
 use crate::Waited;
 

@@ -11,7 +11,7 @@ use toposlam::{
     ring::drivers::{FiringPlan, HcSr04Config, HcSr04Ring, Microseconds, SonarError, SonarFault, SonarRing},
     ring::{Echo, RingFrame},
 };
-use toposlam_host::chip::{EchoPin, HcSr04Bank, HcSr04Fault, SimulatedTime, TriggerPin};
+use toposlam_sim::chip::{EchoPin, HcSr04Bank, HcSr04Fault, SimulatedTime, TriggerPin};
 
 use crate::{World, assert_counted, without};
 

@@ -3,7 +3,7 @@
 use std::{collections::VecDeque, convert::Infallible};
 
 use embedded_hal_nb::{nb, serial};
-use toposlam_host::chip;
+use toposlam_sim::chip;
 
 /// A UART whose other end is a model of the bridge; it can be cut.
 pub(crate) struct Link<DEVICES> {

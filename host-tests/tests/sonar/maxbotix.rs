@@ -10,7 +10,7 @@ use toposlam::{
     ring::drivers::{FiringPlan, MaxBotixConfig, MaxBotixRing, SonarError, SonarFault, SonarRing},
     ring::{Echo, RingFrame},
 };
-use toposlam_host::chip::{I2cBus, MaxBotixBank, SensorFault, SimulatedTime};
+use toposlam_sim::chip::{I2cBus, MaxBotixBank, SensorFault, SimulatedTime};
 
 use crate::{World, assert_counted, without, world, world_frame};
 

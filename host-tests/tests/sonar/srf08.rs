@@ -7,7 +7,7 @@ use toposlam::{
     ring::drivers::{FiringPlan, Sc18im700, SonarError, SonarFault, SonarRing, Srf08Config, Srf08Ring},
     ring::{Echo, RingFrame},
 };
-use toposlam_host::chip::{self, SensorFault, Srf08Bank};
+use toposlam_sim::chip::{self, SensorFault, Srf08Bank};
 
 use crate::{Waited, World, assert_counted, link::Link, world, world_frame};
 

@@ -7,7 +7,7 @@ use toposlam::{
     ring::Echo,
     ring::drivers::{FiringPlan, SonarError, SonarFault, SonarRing, Srf08Config, Srf08Ring},
 };
-use toposlam_host::chip::{I2cBus, SensorFault, Srf08Bank};
+use toposlam_sim::chip::{I2cBus, SensorFault, Srf08Bank};
 
 use crate::{Waited, World, assert_counted, without, world, world_frame};
 

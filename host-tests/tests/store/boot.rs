@@ -1,13 +1,15 @@
 //! What a robot starts with.
 
 use super::*;
-use toposlam::MapperConfig;
+use toposlam::drive::VelocityCommand;
 use toposlam::persist::snapshot::SnapshotError;
 use toposlam::persist::store::{BootOutcome, BootPolicy, BootReport, StoreError, resume};
-use toposlam::wire::Message;
+use toposlam::reference::ReferenceRobot;
+use toposlam::robot::{Board, KeepError, RobotConfig};
+use toposlam::wire::{Decoder, Message, Progress, QueueFull};
 use toposlam::{FaultCounters, Filter};
-use toposlam_host::chip::{Cut, Tear};
-use toposlam_host::world::{Plan, RobotModel, Simulation};
+use toposlam_sim::chip::{Cut, Tear};
+use toposlam_sim::world::{Plan, RobotModel, Simulation};
 
 type Robot16 = Box<reference::RobotMapper>;
 
@@ -18,7 +20,7 @@ fn after(places: u32, every: u32) -> (Robot16, Store<Sectors>) {
     let mut buffer = [0; reference::SNAPSHOT_BYTES];
     let simulation = Simulation::new(&Plan::built_in("office").unwrap(), RobotModel::default(), 3).unwrap();
     for (frame, truth) in simulation {
-        if mapper.observe(&frame, truth.turn, &FaultCounters::new(), |_| Ok(())).is_some() {
+        if mapper.observe(&frame, truth.turn).is_some() {
             let observed = mapper.filter().observed();
             if observed.is_multiple_of(every) {
                 let length = mapper.snapshot(&mut buffer).unwrap();
@@ -37,7 +39,7 @@ fn start(store: &mut Store<Sectors>, policy: BootPolicy) -> (Robot16, BootReport
     let mut mapper = Robot16::new(reference::RobotMapper::new());
     let mut buffer = [0; reference::SNAPSHOT_BYTES];
     let number = store.count_start().ok();
-    mapper.start(&MapperConfig { boot: number.unwrap_or(0), ..reference::MAPPER }).unwrap();
+    mapper.start(&reference::MAPPER).unwrap();
     let report = resume(store, &mut buffer, policy, |bytes, place| mapper.restore(bytes, place));
     (mapper, report, number)
 }
@@ -60,16 +62,50 @@ fn the_policy_says_whether_the_robot_goes_on_with_its_map() {
 fn the_robot_introduces_itself_with_the_number_of_its_start() {
     let mut store = Store::mount(Sectors::new(8), reference::STORE).unwrap();
     for number in 1..5 {
-        let (mut mapper, ..) = start(&mut store, BootPolicy::default());
-        let mut said = None;
+        let boot = store.count_start().unwrap();
+        let config = RobotConfig { boot, ..reference::ROBOT };
+        let mut buffer = [0; reference::SNAPSHOT_BYTES];
+        let mut robot = Box::new(ReferenceRobot::new());
+        robot.boot(&config, &mut buffer, &mut store, BootPolicy::default()).unwrap();
         let frame = toposlam::ring::RingFrame { echoes: [toposlam::ring::Echo::Silence; 16] };
-        mapper.observe(&frame, None, &FaultCounters::new(), |message| {
-            if let Message::Hello(hello) = message {
-                said = Some(hello.boot);
-            }
-            Ok(())
-        });
-        assert_eq!(said, Some(number));
+        let mut line = Line { decoder: Decoder::new(), boot: None };
+        robot.turn(&frame, &FaultCounters::new(), &mut line);
+        assert_eq!(line.boot, Some(number));
+    }
+}
+
+/// A board that notes the number of the start which the robot sends.
+struct Line {
+    decoder: Decoder,
+    boot: Option<u32>,
+}
+
+impl Board for Line {
+    fn receive(&mut self) -> Option<u8> {
+        None
+    }
+
+    fn send(&mut self, frame: &[u8]) -> Result<(), QueueFull> {
+        if let Progress::Message { message: Message::Hello(hello), .. } = self.decoder.feed(frame) {
+            self.boot = Some(hello.boot);
+        }
+        Ok(())
+    }
+
+    fn follow(&mut self, _: VelocityCommand) {}
+
+    fn feed_watchdog(&mut self) {}
+
+    fn now_ms(&mut self) -> u32 {
+        0
+    }
+
+    fn stack_high_water_bytes(&mut self) -> u32 {
+        0
+    }
+
+    fn keep(&mut self, _: &[u8]) -> Result<(), KeepError> {
+        Err(KeepError::NoStore)
     }
 }
 
@@ -91,7 +127,7 @@ fn snapshots_that_cannot_be_taken_give_way_to_the_one_before() {
     other.start(reference::FILTER, 1).unwrap();
     let mut buffer = [0; reference::SNAPSHOT_BYTES];
     let mut writer = Writer::new(&mut buffer).unwrap();
-    writer.section(FILTER_SECTION, |section| Filter::save(&mut other, section)).unwrap();
+    writer.stage(&mut other).unwrap();
     let length = writer.finish().unwrap();
     store.save(&buffer[..length]).unwrap();
     let (_, report, _) = start(&mut store, BootPolicy::ContinueElsewhere);

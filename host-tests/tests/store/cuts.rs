@@ -3,7 +3,7 @@
 use super::*;
 use rayon::prelude::*;
 use toposlam::persist::store::StoreError;
-use toposlam_host::chip::{Cut, Tear};
+use toposlam_sim::chip::{Cut, Tear};
 
 /// What a drive with cuts in it came to.
 #[derive(Clone, Copy, Debug, Default)]

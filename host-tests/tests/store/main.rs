@@ -8,11 +8,11 @@ mod wear;
 
 use common::environments::floor;
 use common::robot::{Hints, Robot};
-use toposlam::persist::snapshot::{FILTER_SECTION, Snapshot, Writer};
+use toposlam::persist::snapshot::{Snapshot, Writer};
 use toposlam::persist::store::Store;
 use toposlam::wire::map_digest;
 use toposlam::{RobustConfig, reference};
-use toposlam_host::chip::FlashModel;
+use toposlam_sim::chip::FlashModel;
 
 /// The two last sectors of the reference robot's flash, and pages as an nRF52840 has them.
 type Sectors = FlashModel<1, { 128 * 1024 }>;
@@ -37,11 +37,10 @@ fn snapshots(places: usize, count: usize, every: usize) -> Vec<Vec<u8>> {
         }
         let mut buffer = vec![0; reference::SNAPSHOT_BYTES];
         let mut writer = Writer::new(&mut buffer).unwrap();
-        writer.section(FILTER_SECTION, |section| filter.save(section)).unwrap();
+        writer.stage(filter.as_mut()).unwrap();
         let length = writer.finish().unwrap();
         buffer.truncate(length);
-        let section = Snapshot::open(&buffer).unwrap().section(FILTER_SECTION).unwrap();
-        restored.restore(section).unwrap();
+        Snapshot::open(&buffer).unwrap().restore(restored.as_mut()).unwrap();
         assert_eq!(map_digest(restored.map()), map_digest(filter.map()));
         all.push(buffer);
     }

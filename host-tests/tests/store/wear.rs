@@ -2,7 +2,7 @@
 
 use super::*;
 use toposlam::persist::store::StoreError;
-use toposlam_host::chip::FlashFault;
+use toposlam_sim::chip::FlashFault;
 
 /// Stores so many times; tells the erases of each sector.
 fn worn<const W: usize, const E: usize>(sectors: usize, snapshots: &[Vec<u8>], times: usize) -> Vec<u32> {

@@ -7,8 +7,8 @@ use std::cell::RefCell;
 use std::rc::Rc;
 use std::time::Duration;
 use toposlam::wire::{CHUNK_BYTES, Command, Message, Refusal, ResetCause, Setting, Version};
-use toposlam_host::client::{Client, ClientError};
-use toposlam_host::listener::{Event, Listener};
+use toposlam_link::client::{Client, ClientError};
+use toposlam_link::listener::{Event, Listener};
 
 type FakeClient = Client<FakeLine, fn(&Listener, Event<'_>)>;
 

@@ -5,11 +5,12 @@ use std::cell::RefCell;
 use std::io::{self, Read, Write};
 use std::rc::Rc;
 use toposlam::RobustConfig;
-use toposlam::reference::{self, HYPOTHESES, RobotMapper, SONARS};
+use toposlam::reference::{self, HYPOTHESES, RobotMapper, SONARS, VERTICES};
 use toposlam::wire::{
-    Command, Encoder, Inbox, Info, Message, Outcome, Refusal, ResetCause, Settings, Staging, Version,
+    Capacities, Command, Encoder, Hello, Inbox, Info, Message, Outcome, Refusal, Reporter, ResetCause, Settings,
+    Staging, Version,
 };
-use toposlam_host::world::{Plan, RobotModel, Simulation};
+use toposlam_sim::world::{Plan, RobotModel, Simulation};
 
 /// Turns after which the robot has found some places.
 pub(crate) const TURNS: usize = 2000;
@@ -18,6 +19,7 @@ pub(crate) const TURNS: usize = 2000;
 pub(crate) struct FakeRobot {
     world: Simulation,
     pub(crate) mapper: Box<RobotMapper>,
+    reporter: Reporter<VERTICES>,
     pub(crate) inbox: Inbox,
     staging: Staging<'static>,
     pub(crate) settings: Settings,
@@ -36,9 +38,12 @@ impl FakeRobot {
         let plan = Plan::built_in("office").unwrap();
         let mut mapper = Box::new(RobotMapper::new());
         mapper.start(&reference::MAPPER).unwrap();
+        let mut reporter = Reporter::new();
+        reporter.start(hello(), 100);
         Self {
             world: Simulation::new(&plan, RobotModel::default(), 3).unwrap(),
             mapper,
+            reporter,
             inbox: Inbox::new(),
             staging: Staging::new(Box::leak(Box::new([0; 300]))),
             settings: Settings {
@@ -70,7 +75,8 @@ impl FakeRobot {
         if !self.paused {
             let (frame, truth) = self.world.next().expect("the drive never ends");
             let said = &mut self.said;
-            self.mapper.observe(&frame, truth.turn, self.inbox.faults(), |message| {
+            let seen = self.mapper.observe(&frame, truth.turn);
+            self.reporter.report(&self.mapper, seen.as_ref(), self.inbox.faults(), |message| {
                 said.push(*message);
                 Ok(())
             });
@@ -83,7 +89,7 @@ impl FakeRobot {
         self.executed.push(*command);
         match *command {
             Command::Info => return Ok(Outcome::Info(self.info())),
-            Command::GetMap => self.mapper.hurry(),
+            Command::GetMap => self.reporter.send_full(),
             Command::GetSnapshot { offset } => {
                 if offset == 0 {
                     self.snapshots_taken = self.snapshots_taken.wrapping_add(1);
@@ -103,11 +109,12 @@ impl FakeRobot {
             },
             Command::Reset => {
                 let said = &mut self.said;
-                let reset = self.mapper.reset(&reference::MAPPER, |message| {
+                self.reporter.forget(|message| {
                     said.push(*message);
                     Ok(())
                 });
-                reset.map_err(|_| Refusal::OutOfRange)?;
+                self.mapper.start(&reference::MAPPER).map_err(|_| Refusal::OutOfRange)?;
+                self.reporter.start(hello(), 100);
             }
             Command::SetConfig(setting) => self.settings = self.settings.with(setting, HYPOTHESES, SONARS)?,
             Command::LocaliseOnly { on } => self.localise_only = on,
@@ -140,6 +147,11 @@ impl FakeRobot {
     pub(crate) fn mapping(&self) -> String {
         format!("{:?}{:?}", self.mapper.detector(), self.mapper.filter())
     }
+}
+
+fn hello() -> Hello {
+    let capacities = Capacities::of_mapper::<SONARS, VERTICES, reference::Filter>(&reference::MAPPER);
+    Hello::new(0, ResetCause::Unknown, reference::SEED, capacities)
 }
 
 /// What a line does to the bytes of one turn, in the given direction.

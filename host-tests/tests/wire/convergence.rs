@@ -369,13 +369,13 @@ fn the_whole_picture_goes_out_in_a_quarter_of_the_ticks_and_then_at_the_usual_pa
     }
     robot.tick(&mut random);
     let usual = robot.tick(&mut random).len();
-    robot.reporter.hurry();
+    robot.reporter.send_full();
     let lengths: Vec<usize> = (0..7).map(|_| robot.tick(&mut random).len()).collect();
     assert_eq!(usual, 1);
     // An introduction, 14 rows, the size, the location, the belief, and no fault.
     assert_eq!(lengths, [5, 4, 4, 4, 1, 1, 1]);
     // A queue that is full holds the rest of the round back.
-    robot.reporter.hurry();
+    robot.reporter.send_full();
     let mut sent = 0;
     let mut calls = 0;
     while sent < 18 {

@@ -9,10 +9,10 @@ use serde_json::{Value, json};
 use toposlam::FaultKind;
 use toposlam::reference::SNAPSHOT_BYTES;
 use toposlam::wire::{DecoderCounters, Echoes, Encoder, Message, Picture, Request, crc32};
-use toposlam_host::exploration::Exploration;
-use toposlam_host::json;
-use toposlam_host::listener::{Event, Listener};
-use toposlam_host::world::{Plan, RobotModel};
+use toposlam_link::json;
+use toposlam_link::listener::{Event, Listener};
+use toposlam_sim::exploration::Exploration;
+use toposlam_sim::world::{Plan, RobotModel};
 
 use super::samples::{extreme_requests, extremes, largest, largest_requests, requests, typical};
 use super::streams::{Draw, damage, every_damage, foreign_payloads, long_lists, lossy, renamed, restarted, wrapping};

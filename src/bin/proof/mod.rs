@@ -13,6 +13,7 @@ use toposlam::{
     Config, ConfigError, Consistency, Direction, FaultCounters, FaultKind, Fingerprint, FingerprintError, History, Map,
     MapperError, Ngram, NgramError, NgramLength, NgramTable, NgramsFull, Observation, PaperFilter, PerVertex, Prior,
     RobustConfig, RobustFilter, Turn, VertexId, VertexSet, VerticesFull,
+    persist::Persist,
     persist::snapshot::{FILTER_SECTION, Resume, Snapshot, SnapshotError, SnapshotPolicy, Writer},
     place::{PlaceConfig, PlaceConfigError, PlaceDetector},
     reference,
@@ -239,7 +240,7 @@ fn robust<const N: usize, const V: usize, const HISTORY: usize>(filter: &mut Rob
     }
     let mut buffer = black_box([0; 100]);
     if let Ok(mut writer) = Writer::new(&mut buffer) {
-        forget(writer.section(FILTER_SECTION, |section| filter.save(section)));
+        forget(writer.stage(filter));
         forget(writer.finish());
     }
     if let Some(section) = Snapshot::open(&buffer).ok().and_then(|snapshot| snapshot.section(FILTER_SECTION)) {
@@ -275,18 +276,17 @@ pub(crate) fn mapper() {
         show::<MapperError>(error);
     }
     for _ in 0..black_box(9) {
-        black_box(mapper.observe(&any_frame(), any_turn(), &FaultCounters::new().opaque(), any_answer));
+        black_box(mapper.observe(&any_frame(), any_turn()));
     }
     robust(mapper.filter_mut());
-    mapper.hurry();
-    black_box(mapper.reset(&reference::MAPPER.opaque(), any_answer).is_ok());
-    black_box((mapper.map(), mapper.filter(), mapper.detector()));
+    mapper.kidnapped();
+    black_box((mapper.faults(), mapper.map(), mapper.filter(), mapper.detector()));
     snapshot(mapper);
     static REPORTER: ConstStaticCell<Reporter<VERTICES>> = ConstStaticCell::new(Reporter::new());
     let Some(reporter) = REPORTER.try_take() else { return };
-    reporter.tick(mapper.map(), &FaultCounters::new().opaque(), any_answer);
-    reporter.hurry();
-    reporter.forget(any_answer);
+    let seen = mapper.observe(&any_frame(), any_turn());
+    reporter.report(mapper, seen.as_ref(), &FaultCounters::new().opaque(), any_answer);
+    reporter.resync(any_answer);
     black_box((reporter.refused(), map_digest(mapper.map())));
 }
 
@@ -301,7 +301,7 @@ fn snapshot(mapper: &mut reference::RobotMapper) {
     if let Err(error) = mapper.snapshot(buffer) {
         show::<SnapshotError>(error);
     }
-    let resume = [Resume::InPlace, Resume::Elsewhere].opaque().first().copied().unwrap_or(Resume::InPlace);
+    let resume = [Resume::InPlace, Resume::AtUnknownVertex].opaque().first().copied().unwrap_or(Resume::InPlace);
     if let Err(error) = mapper.restore(buffer, resume) {
         show::<SnapshotError>(error);
     }

@@ -117,7 +117,7 @@ pub(crate) fn robot() {
     for _ in 0..black_box(9) {
         black_box(robot.turn(&any_frame(), &FaultCounters::new().opaque(), &mut Any));
     }
-    let resume = if black_box(true) { Resume::InPlace } else { Resume::Elsewhere };
+    let resume = if black_box(true) { Resume::InPlace } else { Resume::AtUnknownVertex };
     if let Err(error) = robot.restore(black_box(&[1, 2, 3]), resume) {
         show::<SnapshotError>(error);
     }

@@ -72,8 +72,6 @@ pub enum SnapshotError {
     Capacities,
     /// It says something that no filter says.
     Contents,
-    /// The filter cannot be saved.
-    Unsupported,
 }
 
 impl fmt::Display for SnapshotError {
@@ -85,7 +83,6 @@ impl fmt::Display for SnapshotError {
             Self::Version { found } => write!(f, "the snapshot has version {found}, not {SNAPSHOT_VERSION}"),
             Self::Capacities => f.write_str("the snapshot is of a filter with other capacities"),
             Self::Contents => f.write_str("the snapshot says what no filter says"),
-            Self::Unsupported => f.write_str("the filter cannot be saved"),
         }
     }
 }
@@ -98,7 +95,7 @@ pub enum Resume {
     /// Where it was when the snapshot was made: the next place follows the last one.
     InPlace,
     /// Anywhere: it may have been carried or driven since, so that the next place begins a sequence.
-    Elsewhere,
+    AtUnknownVertex,
 }
 
 /// When snapshots are made.

@@ -1,6 +1,7 @@
 //! Reads a snapshot from a byte string.
 
 use super::{CRC, CRC_BYTES, HEADER_BYTES, MAGIC, SNAPSHOT_VERSION, SnapshotError};
+use crate::persist::Persist;
 
 /// A snapshot whose CRC and version are right.
 #[derive(Clone, Copy, Debug)]
@@ -53,7 +54,15 @@ impl<'a> Snapshot<'a> {
         }
     }
 
-    /// How many bytes the whole snapshot has.
+    /// Restores a stage from its section.
+    ///
+    /// # Errors
+    /// [`SnapshotError::Contents`] if the snapshot has no such section; else as [`Persist::restore`].
+    pub fn restore<S: Persist>(&self, stage: &mut S) -> Result<(), SnapshotError> {
+        stage.restore(self.section(S::SECTION).ok_or(SnapshotError::Contents)?)
+    }
+
+    /// The length of the whole snapshot in bytes.
     pub const fn length(&self) -> usize {
         self.length
     }

@@ -1,6 +1,7 @@
 //! Writes a snapshot into a buffer.
 
 use super::{CRC, CRC_BYTES, HEADER_BYTES, MAGIC, SNAPSHOT_VERSION, SnapshotError};
+use crate::persist::Persist;
 
 /// Writes a snapshot into a buffer of the caller, section by section.
 #[derive(Debug)]
@@ -38,6 +39,14 @@ impl<'a> Writer<'a> {
             self.rewind(mark);
         }
         written
+    }
+
+    /// Writes the section of a stage. When that fails, the section is left out and more sections can follow.
+    ///
+    /// # Errors
+    /// As [`Persist::save`].
+    pub fn stage<S: Persist>(&mut self, stage: &mut S) -> Result<(), SnapshotError> {
+        self.section(S::SECTION, |section| stage.save(section))
     }
 
     fn try_section(

@@ -53,7 +53,7 @@ pub fn resume<FLASH: NorFlash>(
     let mut report = BootReport { outcome: BootOutcome::Fresh, rejected: 0, why: None, store: None };
     let place = match policy {
         BootPolicy::Fresh => return report,
-        BootPolicy::ContinueElsewhere => Resume::Elsewhere,
+        BootPolicy::ContinueElsewhere => Resume::AtUnknownVertex,
         BootPolicy::ContinueInPlace => Resume::InPlace,
     };
     report.outcome = BootOutcome::Nothing;

@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 
 use super::code::codes;
 use super::{Belief, Drive, Echoes, Journey, Renamed, Reply, Worst};
-use crate::{FilterCapacities, Fingerprint, Update};
+use crate::{Filter, FilterCapacities, Fingerprint, MapperConfig, Update};
 
 /// The version of the messages and requests; it grows by one whenever some are appended.
 pub const PROTOCOL_VERSION: u16 = 3;
@@ -175,6 +175,13 @@ impl Capacities {
         let FilterCapacities { hypotheses, history, ngram_length } = filter;
         let fingerprint_step_mm = Fingerprint::STEP_MM as u8;
         Self { vertices, hypotheses, history, ngram_length, fingerprint_step_mm, sonars }
+    }
+
+    /// The capacities of a [`Mapper`](crate::Mapper) with these settings.
+    pub fn of_mapper<const SONARS: usize, const V: usize, F: Filter<V>>(
+        config: &MapperConfig<SONARS, F::Config>,
+    ) -> Self {
+        Self::new(V as u8, F::capacities(&config.filter), SONARS as u8)
     }
 }
 

@@ -2,9 +2,10 @@
 
 use core::fmt;
 
+use crate::place::Place;
 use crate::wire::digest::{map_digest, row_of};
 use crate::wire::{Belief, Capacities, Evidence, Hello, List, Location, Message, Renamed, ResetCause, Row, Worst};
-use crate::{FaultCounters, FaultKind, Filter, Map, Update};
+use crate::{FaultCounters, FaultKind, Filter, Map, Mapper, Update};
 
 /// Decides what to send. It keeps what the listener was last told and hands each message to a callback, which says
 /// whether the transmit queue took it; it never waits.
@@ -29,13 +30,13 @@ pub struct Reporter<const V: usize> {
     turn: u8,
     fault_turn: u8,
     /// Whether the rest of the round goes out fast.
-    hurries: bool,
+    sends_full: bool,
     refused: u32,
 }
 
 impl<const V: usize> Reporter<V> {
-    /// How many pieces of the rolling picture a tick sends in a hurry.
-    const PIECES_IN_A_HURRY: u8 = 4;
+    /// How many pieces of the map a tick sends after [`Reporter::send_full`].
+    const PIECES_PER_FULL_TICK: u8 = 4;
 
     /// A reporter that has to be started.
     pub const fn new() -> Self {
@@ -61,7 +62,7 @@ impl<const V: usize> Reporter<V> {
             faults: [0; FaultKind::ALL.len()],
             turn: 0,
             fault_turn: 0,
-            hurries: false,
+            sends_full: false,
             refused: 0,
         }
     }
@@ -81,21 +82,20 @@ impl<const V: usize> Reporter<V> {
         self.faults = [0; FaultKind::ALL.len()];
         self.turn = 0;
         self.fault_turn = 0;
-        self.hurries = false;
+        self.sends_full = false;
         self.refused = 0;
     }
 
-    /// Begins a round of the rolling picture, with an introduction, of which every tick sends four pieces; after the round the
-    /// pace is the usual one again. A listener who asks for the map has it after `vertices / 4 + 1` ticks in which
-    /// no frame is lost.
-    pub fn hurry(&mut self) {
+    /// Starts a new round of the repeated map with a `Hello`, at four pieces per tick; the next round has the usual pace
+    /// again. A listener that requests the map has it after `vertices / 4 + 1` ticks without a lost frame.
+    pub fn send_full(&mut self) {
         self.ticks_to_hello = 0;
         self.turn = 0;
-        self.hurries = true;
+        self.sends_full = true;
     }
 
-    /// Before the map is forgotten or another one takes its place: tells that every vertex is gone. To be followed by
-    /// [`Reporter::start`], or by updates and ticks with the other map.
+    /// Sends that every vertex is gone, before the map is cleared or replaced. [`Reporter::start`] follows, or updates and
+    /// ticks with the new map.
     pub fn forget(&mut self, mut send: impl FnMut(&Message) -> Result<(), QueueFull>) {
         let vertices = self.vertices.max(self.vertices_before);
         if vertices == 0 {
@@ -110,6 +110,40 @@ impl<const V: usize> Reporter<V> {
         self.vertices_before = 0;
         self.location = None;
         self.belief = None;
+    }
+
+    /// After the map was replaced, as by the restore of a snapshot: the listener clears its map, and the new one is sent as
+    /// a whole.
+    pub fn resync(&mut self, send: impl FnMut(&Message) -> Result<(), QueueFull>) {
+        self.forget(send);
+        self.send_full();
+    }
+
+    /// Reports one ring frame: the place, what it changed, and the next piece of the repeated map.
+    ///
+    /// `seen` is the result of [`Mapper::observe`]. `faults` are those of the stages outside the mapper, which are sent as
+    /// one sum with the mapper's. Every message goes to `send`, which says whether the transmit queue took it.
+    #[inline(never)]
+    pub fn report<const SONARS: usize, F: Filter<V>>(
+        &mut self,
+        mapper: &Mapper<SONARS, V, F>,
+        seen: Option<&(Place, Update)>,
+        faults: &FaultCounters,
+        mut send: impl FnMut(&Message) -> Result<(), QueueFull>,
+    ) {
+        if let Some((place, update)) = seen {
+            // A place is not part of the state: one that the queue refuses is only missing in the listener's log.
+            let _ = send(&Message::Place {
+                place_index: update.place_index,
+                frame_index: place.frame_index,
+                radius_mm: place.fingerprint.radius_mm(),
+                degree: place.degree,
+            });
+            self.update(mapper.filter(), update, &mut send);
+        }
+        let mut faults = *faults;
+        faults.add(&mapper.faults());
+        self.tick(mapper.map(), &faults, send);
     }
 
     /// How many messages the queue refused since the start; saturates.
@@ -206,12 +240,12 @@ impl<const V: usize> Reporter<V> {
                 self.send_fault(kind, faults.count(kind), &mut send);
             }
         }
-        for _ in 0..if self.hurries { Self::PIECES_IN_A_HURRY } else { 1 } {
+        for _ in 0..if self.sends_full { Self::PIECES_PER_FULL_TICK } else { 1 } {
             if !self.send_piece(map, faults, &mut send) {
                 return;
             }
             if self.turn == 0 {
-                self.hurries = false;
+                self.sends_full = false;
                 return;
             }
         }

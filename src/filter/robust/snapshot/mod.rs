@@ -8,7 +8,8 @@ mod parts;
 
 use super::{RobustConfig, RobustFilter, worst};
 use crate::FaultCounters;
-use crate::persist::snapshot::{FRAME_BYTES, Reader, SnapshotError, Writer};
+use crate::persist::Persist;
+use crate::persist::snapshot::{FILTER_SECTION, FRAME_BYTES, Reader, SnapshotError, Writer};
 use parts::{TALLY_BYTES, path_bytes, row_bytes};
 
 /// What the contents of the filter's section begin with.
@@ -38,6 +39,10 @@ impl<const N: usize, const V: usize, const HISTORY: usize> RobustFilter<N, V, HI
         let hypothesis = hypothesis::FIXED_BYTES + path_bytes(V, HISTORY) + counted;
         FRAME_BYTES + HEAD_BYTES + 2 + 3 * HISTORY + told + 1 + hypothesis::KEPT_BYTES + counted + N * hypothesis
     };
+}
+
+impl<const N: usize, const V: usize, const HISTORY: usize> Persist for RobustFilter<N, V, HISTORY> {
+    const SECTION: u8 = FILTER_SECTION;
 
     /// Writes what the filter knows: settings, places, what it told last, and the hypotheses, the best first, as many as there is
     /// room for. A buffer of [`RobustFilter::SNAPSHOT_BYTES`] has room for all, and the restored filter then goes on as this one
@@ -46,7 +51,7 @@ impl<const N: usize, const V: usize, const HISTORY: usize> RobustFilter<N, V, HI
     /// # Errors
     /// [`SnapshotError::Full`] when there is no room for the best hypothesis.
     #[inline(never)]
-    pub fn save(&mut self, writer: &mut Writer<'_>) -> Result<(), SnapshotError> {
+    fn save(&mut self, writer: &mut Writer<'_>) -> Result<(), SnapshotError> {
         self.make_canonical();
         self.head().save::<V, HISTORY>(writer)?;
         self.record.save(writer)?;
@@ -83,11 +88,18 @@ impl<const N: usize, const V: usize, const HISTORY: usize> RobustFilter<N, V, HI
     /// # Errors
     /// [`SnapshotError::Capacities`] for another kind of filter or other capacities, [`SnapshotError::TooShort`], or
     /// [`SnapshotError::Contents`]; the filter then goes on as it was.
-    pub fn restore(&mut self, reader: Reader<'_>) -> Result<(), SnapshotError> {
-        self.read(reader, false)?;
-        self.read(reader, true)
+    fn restore(&mut self, section: Reader<'_>) -> Result<(), SnapshotError> {
+        self.check(section)?;
+        self.read(section, true)
     }
 
+    /// Cost: a pass over the bytes.
+    fn check(&mut self, section: Reader<'_>) -> Result<(), SnapshotError> {
+        self.read(section, false)
+    }
+}
+
+impl<const N: usize, const V: usize, const HISTORY: usize> RobustFilter<N, V, HISTORY> {
     /// Reads a snapshot, and takes it over if it is to be `kept`; else only the drafts are written to.
     #[inline(never)]
     fn read(&mut self, mut from: Reader<'_>, kept: bool) -> Result<(), SnapshotError> {

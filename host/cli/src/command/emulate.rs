@@ -1,0 +1,199 @@
+//! `toposlam emulate`: the same exploration as `simulate`, mapped and driven by the firmware in an emulated STM32F405.
+
+use std::{
+    ops::ControlFlow,
+    path::PathBuf,
+    process::Command,
+    sync::{Mutex, mpsc},
+    time::Duration,
+};
+
+use anyhow::{Context, bail, ensure};
+use clap::Args;
+use toposlam::drive::VelocityCommand;
+use toposlam::reference::SNAPSHOT_BYTES;
+use toposlam::wire::{Belief, Evidence, Location, Message, Worst};
+use toposlam_cli::emulator::Emulation;
+use toposlam_sim::exploration::Exploration;
+use toposlam_sim::injector::FaultRates;
+
+use super::drive::{DriveArguments, Summary, fault_rate, progress_bar};
+use super::hardship;
+use super::heard::Heard;
+
+/// Where `cargo firmware` puts the image.
+const IMAGE: &str = "thumbv7em-none-eabihf/firmware/robot";
+
+/// Arguments of `toposlam emulate`.
+#[derive(Args)]
+pub(crate) struct Arguments {
+    #[command(flatten)]
+    drive: DriveArguments,
+    /// Drive until this many places were detected.
+    #[arg(long, default_value_t = 30)]
+    places: usize,
+    /// The firmware image; built with `cargo firmware` when it is not given.
+    #[arg(long)]
+    elf: Option<PathBuf>,
+    /// The emulator.
+    #[arg(long, default_value = "qemu-system-arm")]
+    qemu: PathBuf,
+    /// Give up after this many seconds.
+    #[arg(long, default_value_t = 800)]
+    timeout_s: u64,
+    /// Faults of the sensor bus and the line, 0 to 1: the probability that a transfer is refused; the others follow
+    /// (docs/faults.md). With faults the map is held to the truth, and not to this computer's.
+    #[arg(long, default_value_t = 0.0, value_parser = fault_rate)]
+    faults: f64,
+}
+
+/// So long the world waits for the firmware to say where it drives.
+const VELOCITY_TIMEOUT: Duration = Duration::from_secs(10);
+
+/// The same robot on this computer, and where it wanted to go after each frame.
+struct Repetition<'buffer> {
+    exploration: Exploration<'buffer>,
+    velocities: Vec<VelocityCommand>,
+}
+
+pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
+    let elf = match &arguments.elf {
+        Some(elf) => elf.clone(),
+        None => build_firmware()?,
+    };
+    let mut emulation = Emulation::new(elf);
+    emulation.qemu = arguments.qemu.clone();
+    emulation.timeout = Duration::from_secs(arguments.timeout_s);
+    if arguments.faults > 0.0 {
+        return hardship::run(&arguments.drive, emulation, arguments.places, FaultRates::scaled(arguments.faults));
+    }
+    let (plan, model) = arguments.drive.world()?;
+    let mut buffer = [0; SNAPSHOT_BYTES];
+    // The emulator asks for frames on one thread and hands on what it heard on another.
+    let repetition = Mutex::new(Repetition {
+        exploration: Exploration::start(&plan, model, arguments.drive.seed(), &mut buffer)?,
+        velocities: Vec::new(),
+    });
+    let (tell_velocity, velocities) = mpsc::channel::<VelocityCommand>();
+    let progress = progress_bar(arguments.places)?;
+    let mut heard = Heard::new();
+    let mut elsewhere = None;
+    let mut frames = 0;
+    let (repeated, bar) = (&repetition, &progress);
+
+    let outcome = emulation.run(
+        move || {
+            if frames > 0 {
+                // The firmware has driven on by what it said after the last frame.
+                let velocity = velocities.recv_timeout(VELOCITY_TIMEOUT).ok()?;
+                repeated.lock().ok()?.exploration.drive(velocity);
+            }
+            let mut repetition = repeated.lock().ok()?;
+            if repetition.exploration.places() >= arguments.places {
+                return None;
+            }
+            frames += 1;
+            let frame = repetition.exploration.frame();
+            if repetition.exploration.map(&frame).is_some()
+                && let Some(step) = repetition.exploration.steps().last()
+            {
+                bar.suspend(|| println!("{step}"));
+                bar.inc(1);
+            }
+            let velocity = repetition.exploration.board().velocity;
+            repetition.velocities.push(velocity);
+            Some(frame)
+        },
+        |bytes, _| {
+            heard.feed(bytes, |message| {
+                let Ok(repetition) = repetition.lock() else { return ControlFlow::Break(()) };
+                let is_same = match message {
+                    Message::Drive(drive) => {
+                        let speed_permille = drive.speed_permille.unsigned_abs();
+                        let velocity = VelocityCommand { heading_mrad: drive.heading_mrad, speed_permille };
+                        // The world may have ended meanwhile.
+                        let _ = tell_velocity.send(velocity);
+                        let expected = repetition.velocities.get(drive.frame_index as usize);
+                        expected.is_none_or(|expected| *expected == velocity)
+                    }
+                    Message::Location(location) => {
+                        let step = repetition.exploration.steps().get(location.place_index as usize);
+                        step.is_none_or(|step| Location::from(&step.update) == location)
+                    }
+                    _ => true,
+                };
+                if is_same {
+                    return ControlFlow::Continue(());
+                }
+                elsewhere = Some(message);
+                ControlFlow::Break(())
+            })
+        },
+    )?;
+    progress.finish_and_clear();
+    if let Some(message) = elsewhere {
+        bail!("the firmware says {message:?}, and this computer does not");
+    }
+
+    let Ok(Repetition { exploration, .. }) = repetition.into_inner() else {
+        bail!("the repetition on this computer failed")
+    };
+    arguments.drive.summarise(&Summary::of(&plan, &exploration))?;
+    let counters = heard.decoder.counters();
+    let Some(health) = heard.picture.health() else { bail!("the firmware never said how it is doing") };
+    println!("firmware: {} places in {} frames, {:.1} s", heard.places.len(), outcome.frames, outcome.seconds);
+    println!("wire: {} messages, {} frames lost, {} corrupt", counters.messages, counters.lost, counters.corrupt);
+    println!("sensor bus: {} bytes, {} rounds of the loop", outcome.bus_bytes, health.loop_count);
+    if let Some(bytes) = outcome.stack_high_water_bytes {
+        println!("stack_high_water_bytes: {bytes}");
+    }
+    compare(&exploration, &heard)?;
+    println!("the firmware's drive and map are this computer's, bit for bit");
+    Ok(())
+}
+
+/// Holds what the firmware said to this computer's repetition. The digest is part of a converged picture.
+fn compare(exploration: &Exploration<'_>, heard: &Heard) -> anyhow::Result<()> {
+    let (steps, mapper) = (exploration.steps(), exploration.robot().mapper());
+    let map = mapper.map();
+    let places = steps.iter().map(|step| (step.update.place_index, step.place.fingerprint.radius_mm()));
+    ensure!(places.eq(heard.places.iter().copied()), "the firmware detected other places than this computer");
+    ensure!(heard.picture.is_converged(), "the map heard over the wire is not complete");
+    let same_rows = map.vertices().all(|vertex| {
+        heard.picture.row(vertex.into()).is_some_and(|row| {
+            map.label(vertex).map(|label| label.radius_mm()) == Some(row.radius_mm)
+                && map.visits(vertex) == row.visits
+                && map.neighbours(vertex).bits() == row.neighbours
+        })
+    });
+    let same_size = usize::from(heard.picture.vertices()) == map.vertices().len();
+    ensure!(same_rows && same_size, "the firmware's map is another one");
+    if let Some(step) = steps.last() {
+        let (filter, place_index) = (mapper.filter(), step.update.place_index);
+        ensure!(
+            heard.picture.location() == Some(Location::from(&step.update)),
+            "the firmware believes to be elsewhere"
+        );
+        ensure!(heard.picture.evidence() == Some(Evidence::from(&step.update)), "the firmware gives other evidence");
+        let belief = Some(Belief::of(filter, place_index));
+        ensure!(heard.picture.belief() == belief, "the firmware gives other probabilities");
+        let worst = Some(Worst::of(filter, place_index));
+        ensure!(heard.picture.worst() == worst, "the firmware names another worst n-gram");
+    }
+    Ok(())
+}
+
+/// Builds the firmware from the working directory and says where it is.
+fn build_firmware() -> anyhow::Result<PathBuf> {
+    let cargo = std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into());
+    let status = Command::new(cargo)
+        .args(["firmware", "--bin", "robot"])
+        .status()
+        .context("building the firmware with `cargo firmware`")?;
+    ensure!(
+        status.success(),
+        "`cargo firmware` failed; it needs `rustup target add thumbv7em-none-eabihf` and the project's directory"
+    );
+    let target = std::env::var_os("CARGO_TARGET_DIR").map_or_else(|| PathBuf::from("target"), PathBuf::from);
+    Ok(target.join(IMAGE))
+}

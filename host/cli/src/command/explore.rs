@@ -1,0 +1,186 @@
+//! `toposlam explore`: how often a robot that drives itself ends with the right map, over many runs, and how often it gets where
+//! it is told to go.
+
+use anyhow::ensure;
+use clap::Args;
+use rayon::prelude::*;
+use toposlam::drive::GoalStatus;
+use toposlam::reference::SNAPSHOT_BYTES;
+use toposlam::wire::Command;
+use toposlam_eval::mapping::score_exploration;
+use toposlam_sim::exploration::Exploration;
+use toposlam_sim::injector::FaultRates;
+use toposlam_sim::world::{Plan, Report, RobotModel};
+
+use super::drive::{fault_rate, load_plan, noise_factor};
+
+/// A journey that takes more ring frames is given up.
+const FRAMES_PER_JOURNEY: u64 = 20_000;
+
+/// Arguments of `toposlam explore`.
+#[derive(Args)]
+pub(crate) struct Arguments {
+    /// Floor plans: ring, office, flat, or files.
+    #[arg(long, value_delimiter = ',', default_value = "office,ring,flat")]
+    plans: Vec<String>,
+    /// Every noise of the robot, multiplied by each of these.
+    #[arg(long, value_delimiter = ',', default_value = "1,2", value_parser = noise_factor)]
+    noises: Vec<f64>,
+    /// Runs for each plan and noise; run i has seed i.
+    #[arg(long, default_value_t = 100)]
+    runs: u64,
+    /// Places of an exploration.
+    #[arg(long, default_value_t = 300)]
+    places: usize,
+    /// After the exploration, so many vertices to go to, one after the other.
+    #[arg(long, default_value_t = 5)]
+    journeys: u64,
+    /// Sonars that are dead, as bits.
+    #[arg(long, default_value_t = 0)]
+    dead_sonars: u16,
+    /// Share of the echoes that are missed, instead of the noise's.
+    #[arg(long)]
+    missed: Option<f64>,
+    /// How far off its normal a wall is still heard, in degrees.
+    #[arg(long)]
+    specular_limit_deg: Option<f64>,
+    /// Faults of the ring and the line, 0 to 1: the probability that a sonar's answer is lost; the others follow (docs/faults.md).
+    #[arg(long, default_value_t = 0.0, value_parser = fault_rate)]
+    faults: f64,
+}
+
+/// What one run came to.
+struct Run {
+    report: Report,
+    exact: bool,
+    complete: bool,
+    locations: f64,
+    times_lost: u32,
+    bumps: u32,
+    frames: u64,
+    journeys: Journeys,
+}
+
+/// How the journeys went.
+#[derive(Clone, Copy, Default)]
+struct Journeys {
+    /// Those that were asked for on an exact map.
+    asked: u64,
+    /// Those that ended at the true place.
+    arrived: u64,
+    /// Those that the robot took to have ended well and that had not.
+    elsewhere: u64,
+}
+
+pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
+    ensure!(arguments.runs > 0, "--runs must not be 0");
+    println!(
+        "| Plan | Noise | Exact maps | Complete | Located | Found / missed / doubled / phantom | Radius error, median / 90 % \
+         | Degree told / right | Lost its way | Touched a wall | Frames a place | Journeys arrived / asked / elsewhere |"
+    );
+    println!("|---|---|---|---|---|---|---|---|---|---|---|---|");
+    for name in &arguments.plans {
+        let plan = load_plan(name)?;
+        for &noise in &arguments.noises {
+            let runs: Result<Vec<Run>, _> =
+                (1..=arguments.runs).into_par_iter().map(|seed| one(arguments, &plan, noise, seed)).collect();
+            print_row(name, noise, &runs?, arguments.places);
+        }
+    }
+    Ok(())
+}
+
+fn one(arguments: &Arguments, plan: &Plan, noise: f64, seed: u64) -> anyhow::Result<Run> {
+    let mut model = RobotModel::default().with_noise(noise);
+    model.sonar.dead_sonars = arguments.dead_sonars;
+    model.sonar.missed_share = arguments.missed.unwrap_or(model.sonar.missed_share);
+    if let Some(limit_deg) = arguments.specular_limit_deg {
+        model.sonar.specular_limit_rad = limit_deg.to_radians();
+    }
+    let mut buffer = [0; SNAPSHOT_BYTES];
+    let mut exploration = Exploration::start(plan, model, seed, &mut buffer)?;
+    if arguments.faults > 0.0 {
+        exploration.set_faults(FaultRates::scaled(arguments.faults), seed);
+    }
+    let most_frames = arguments.places as u64 * 2000;
+    while exploration.places() < arguments.places && exploration.frames() < most_frames {
+        exploration.advance();
+    }
+    let score = score_exploration(&exploration);
+    let seen: std::collections::BTreeSet<usize> = exploration.nodes().iter().copied().flatten().collect();
+    let mut run = Run {
+        report: exploration.journal().report(),
+        exact: score.exact,
+        complete: seen.len() == exploration.rover().true_map().nodes.len(),
+        locations: score.location,
+        times_lost: exploration.times_lost(),
+        bumps: exploration.rover().bumps(),
+        frames: exploration.frames(),
+        journeys: Journeys::default(),
+    };
+    if run.exact && run.complete {
+        run.journeys = travel(&mut exploration, arguments.journeys, seed);
+    }
+    Ok(run)
+}
+
+/// Sends the robot to vertices of its map by commands over its line, and looks where it says that it has arrived.
+fn travel(exploration: &mut Exploration<'_>, journeys: u64, seed: u64) -> Journeys {
+    let mut outcome = Journeys::default();
+    for number in 0..journeys {
+        let vertices = exploration.robot().mapper().map().vertices().len() as u64;
+        let here = exploration.steps().last().map(|step| u8::from(step.update.vertex));
+        // Any other vertex, by the seed.
+        let vertex = ((seed + 7 * number) % vertices.max(1)) as u8;
+        if Some(vertex) == here {
+            continue;
+        }
+        // On an exact map the places of a vertex are those of one node.
+        let places = exploration.path().into_iter().zip(exploration.nodes().iter().copied());
+        let truth = places.rev().find(|(taken_for, _)| *taken_for == Some(vertex.into())).and_then(|(_, node)| node);
+        exploration.command(Command::GoTo { vertex });
+        exploration.advance();
+        outcome.asked += 1;
+        let begun = exploration.frames();
+        while exploration.is_underway() && exploration.frames() < begun + FRAMES_PER_JOURNEY {
+            exploration.advance();
+        }
+        if exploration.robot().drive().goal_status() == GoalStatus::Reached {
+            let node = exploration.nodes().last().copied().flatten();
+            outcome.arrived += u64::from(node == truth);
+            outcome.elsewhere += u64::from(node != truth);
+        }
+    }
+    outcome
+}
+
+fn print_row(name: &str, noise: f64, runs: &[Run], places: usize) {
+    let share = |count: usize| 100.0 * count as f64 / runs.len() as f64;
+    let sum = |of: fn(&Run) -> usize| runs.iter().map(of).sum::<usize>();
+    let mut errors_mm: Vec<f64> =
+        runs.iter().flat_map(|run| run.report.radius_errors_mm.iter().map(|error_mm| error_mm.abs())).collect();
+    errors_mm.sort_by(f64::total_cmp);
+    let rank = |share: f64| errors_mm.get((share * errors_mm.len() as f64) as usize).copied().unwrap_or(0.0);
+    let located = runs.iter().map(|run| run.locations).sum::<f64>() / runs.len() as f64;
+    let frames = runs.iter().map(|run| run.frames).sum::<u64>() / (runs.len() * places) as u64;
+    let journeys = |of: fn(&Journeys) -> u64| runs.iter().map(|run| of(&run.journeys)).sum::<u64>();
+    println!(
+        "| {name} | {noise} | {:.0} % | {:.0} % | {:.1} % | {} / {} / {} / {} | {:.0} / {:.0} mm | {} / {} | {} | {} | {frames} | {} / {} / {} |",
+        share(runs.iter().filter(|run| run.exact).count()),
+        share(runs.iter().filter(|run| run.complete).count()),
+        100.0 * located,
+        sum(|run| run.report.found),
+        sum(|run| run.report.missed),
+        sum(|run| run.report.doubled),
+        sum(|run| run.report.phantom),
+        rank(0.5),
+        rank(0.9),
+        sum(|run| run.report.degrees.0),
+        sum(|run| run.report.degrees.1),
+        sum(|run| run.times_lost as usize),
+        sum(|run| run.bumps as usize),
+        journeys(|journeys| journeys.arrived),
+        journeys(|journeys| journeys.asked),
+        journeys(|journeys| journeys.elsewhere),
+    );
+}

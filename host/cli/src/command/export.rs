@@ -1,0 +1,123 @@
+//! `toposlam export`: a robot's map as GraphML, DOT, GeoJSON, JSON or SVG.
+
+use std::fs::File;
+use std::io::{self, Read, Write};
+use std::path::{Path, PathBuf};
+
+use anyhow::{Context, ensure};
+use clap::{Args, ValueEnum};
+use toposlam_link::client::Client;
+use toposlam_link::export;
+use toposlam_link::layout::Layout;
+use toposlam_link::line;
+use toposlam_link::listener::{Event, Listener, Understanding};
+use toposlam_link::log::{self, LogError};
+
+/// Arguments of `toposlam export`.
+#[derive(Args)]
+pub(crate) struct Arguments {
+    /// Where the map comes from: a robot's line (a serial port, or tcp:HOST:PORT), a recording of `record` (FILE.mcap), a
+    /// file of the bytes that a robot sent, or - for such bytes from the standard input.
+    source: String,
+    /// The format.
+    #[arg(long)]
+    format: Format,
+    /// The file to write; the standard output if not given.
+    #[arg(long)]
+    output: Option<PathBuf>,
+    /// The speed of a serial port.
+    #[arg(long, default_value_t = 115_200)]
+    baud: u32,
+    /// How long an edge is about in GeoJSON, in metres.
+    #[arg(long, default_value_t = 5.0, value_parser = edge_m)]
+    edge_m: f64,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+enum Format {
+    Graphml,
+    Dot,
+    Geojson,
+    Json,
+    Svg,
+}
+
+fn edge_m(text: &str) -> Result<f64, String> {
+    let edge_m = text.parse().map_err(|error| format!("{error}"))?;
+    if (0.1..=1000.0).contains(&edge_m) { Ok(edge_m) } else { Err("must be 0.1 to 1000".to_owned()) }
+}
+
+pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
+    let listener = listen(&arguments.source, arguments.baud)?;
+    if let understanding @ (Understanding::Not(_) | Understanding::Partly { .. }) = listener.understanding() {
+        eprintln!("{understanding}");
+    }
+    let map = listener.map();
+    ensure!(!map.vertices.is_empty(), "{}: no map was heard", arguments.source);
+    let mut layout = Layout::new();
+    layout.arrange(&map);
+    let points = layout.points();
+    let here = listener.picture().location().map(|location| location.vertex);
+    let text = match arguments.format {
+        Format::Graphml => export::graphml(&map, points, here),
+        Format::Dot => export::dot(&map, points, here),
+        Format::Geojson => export::geojson(&map, points, here, arguments.edge_m),
+        Format::Json => export::json(&map, points, here),
+        Format::Svg => export::svg(&map, points, here),
+    };
+    match &arguments.output {
+        Some(file) => std::fs::write(file, text).with_context(|| format!("writing {}", file.display())),
+        None => Ok(io::stdout().write_all(text.as_bytes())?),
+    }
+}
+
+/// What is heard from a source: its map.
+fn listen(source: &str, baud: u32) -> anyhow::Result<Listener> {
+    if source == "-" {
+        return recorded(io::stdin().lock()).context("reading the standard input");
+    }
+    let path = Path::new(source);
+    if path.extension().is_some_and(|extension| extension == "mcap") {
+        return replayed(path).with_context(|| format!("reading {source}"));
+    }
+    if path.is_file() {
+        let file = File::open(source).with_context(|| format!("opening {source}"))?;
+        return recorded(file).with_context(|| format!("reading {source}"));
+    }
+    let line = line::open(source, baud)?;
+    let mut client = Client::new(line, rand::random(), |_: &Listener, _: Event<'_>| {});
+    client.map()?;
+    Ok(client.listener().clone())
+}
+
+/// What is known at the end of the bytes that a robot sent.
+fn recorded(mut bytes: impl Read) -> io::Result<Listener> {
+    let mut listener = Listener::new();
+    let mut buffer = [0; 1 << 16];
+    loop {
+        match bytes.read(&mut buffer) {
+            Ok(0) => break,
+            Ok(count) => listener.feed(&buffer[..count], |_, _| ()),
+            Err(error) if error.kind() == io::ErrorKind::Interrupted => {}
+            Err(error) => return Err(error),
+        }
+    }
+    complain_of_gaps(&listener);
+    Ok(listener)
+}
+
+/// What is known at the end of a recording.
+fn replayed(path: &Path) -> Result<Listener, LogError> {
+    let mut listener = Listener::new();
+    for bytes in log::frames(path)? {
+        listener.feed(&bytes?, |_, _| ());
+    }
+    complain_of_gaps(&listener);
+    Ok(listener)
+}
+
+fn complain_of_gaps(listener: &Listener) {
+    if !listener.picture().is_complete() || !listener.picture().is_converged() {
+        eprintln!("the map was not heard whole: vertices or edges may be missing");
+    }
+}

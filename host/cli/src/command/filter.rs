@@ -1,0 +1,22 @@
+//! The choice of a filter on the command line.
+
+use clap::ValueEnum;
+use toposlam_eval::mapping::FilterChoice;
+
+/// Which filter makes the map.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(super) enum FilterArgument {
+    /// The robust filter, which the firmware runs.
+    Robust,
+    /// The filter of the paper.
+    Paper,
+}
+
+impl From<FilterArgument> for FilterChoice {
+    fn from(argument: FilterArgument) -> Self {
+        match argument {
+            FilterArgument::Robust => Self::Robust,
+            FilterArgument::Paper => Self::Paper,
+        }
+    }
+}

@@ -1,0 +1,189 @@
+//! `toposlam fleet`: listen to many robots at once, and say what that costs.
+
+use std::io::{BufRead, BufReader};
+use std::path::PathBuf;
+use std::process::{Child, Command, Stdio};
+use std::time::{Duration, Instant};
+
+use anyhow::{Context, ensure};
+use clap::Args;
+use toposlam_cli::fleet::cost::{allow_many_connections, computing_time, resident_bytes};
+use toposlam_cli::fleet::{End, Fleet, Robot, Totals};
+
+use super::interrupt::Interrupt;
+use super::robots::pace;
+
+/// How often what was heard is told.
+const REPORT: Duration = Duration::from_secs(1);
+/// How long robots are waited for before what is heard is told.
+const CONNECTING: Duration = Duration::from_secs(5);
+
+/// Arguments of `toposlam fleet`.
+#[derive(Args)]
+pub(crate) struct Arguments {
+    /// A file with the line of a robot in each line: tcp:HOST:PORT and, if wanted, its name.
+    #[arg(required_unless_present = "simulate", conflicts_with = "simulate")]
+    lines: Option<PathBuf>,
+    /// Listen to so many recorded robots, which another process lets speak.
+    #[arg(long)]
+    simulate: Option<u32>,
+    /// Stop after so many seconds; without it, at Ctrl-C or when nobody is connected any more.
+    #[arg(long)]
+    seconds: Option<u64>,
+    /// How much faster than real ones recorded robots live; 0: as fast as they are listened to.
+    #[arg(long, default_value_t = 1.0, value_parser = pace, requires = "simulate")]
+    speed: f64,
+}
+
+pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
+    allow_many_connections().context("opening many connections")?;
+    let (lines, _crowd) = match (&arguments.lines, arguments.simulate) {
+        (None, Some(count)) => {
+            let (crowd, address) = Crowd::start(count, arguments.speed)?;
+            ((0..count).map(|number| (format!("robot {number}"), address.clone())).collect(), Some(crowd))
+        }
+        (file, _) => {
+            let file = file.as_deref().context("no file of lines")?;
+            let text = std::fs::read_to_string(file).with_context(|| format!("reading {}", file.display()))?;
+            (lines_of(&text)?, None)
+        }
+    };
+    let interrupt = Interrupt::watch()?;
+    let mut fleet = Fleet::new()?;
+    let resident_before = resident_bytes();
+    for (name, address) in &lines {
+        fleet.connect(name, address);
+    }
+    let began = Instant::now();
+    while fleet.totals().connecting > 0 && began.elapsed() < CONNECTING && !interrupt.is_told() {
+        fleet.listen(REPORT / 100, |_, _, _| ())?;
+    }
+    let end = arguments.seconds.map(Duration::from_secs);
+    let start = Sample::take(Instant::now(), &fleet);
+    let mut last = start;
+    loop {
+        let report_at = last.at + REPORT;
+        while let Some(left) = report_at.checked_duration_since(Instant::now())
+            && !left.is_zero()
+            && !interrupt.is_told()
+        {
+            fleet.listen(left, |_, _, _| ())?;
+        }
+        let sample = Sample::take(Instant::now(), &fleet);
+        println!("{}", sample.since(&last));
+        last = sample;
+        let is_over = end.is_some_and(|end| last.at - start.at >= end);
+        if is_over || interrupt.is_told() || last.totals.connected + last.totals.connecting == 0 {
+            break;
+        }
+    }
+    for robot in fleet.robots() {
+        match robot.end() {
+            Some(End::Closed) => eprintln!("{} closed its line", robot.name()),
+            Some(End::Failed(reason)) => eprintln!("{} failed: {reason}", robot.name()),
+            None => {}
+        }
+    }
+    println!("in all: {}", last.since(&start));
+    let robots = fleet.robots().len().max(1) as u64;
+    println!("{} bytes a robot in this process's own books", size_of::<Robot>());
+    if let (Some(before), Some(after)) = (resident_before, resident_bytes()) {
+        println!("{} bytes of memory in use a robot, {after} in all", after.saturating_sub(before) / robots);
+    }
+    Ok(())
+}
+
+/// What was heard up to a moment, and what it took.
+#[derive(Clone, Copy)]
+struct Sample {
+    at: Instant,
+    computing: Option<Duration>,
+    totals: Totals,
+}
+
+impl Sample {
+    fn take(at: Instant, fleet: &Fleet) -> Self {
+        Self { at, computing: computing_time(), totals: fleet.totals() }
+    }
+
+    /// The state, and the rates since an earlier sample.
+    fn since(&self, earlier: &Self) -> String {
+        let (now, then) = (&self.totals, &earlier.totals);
+        let seconds = (self.at - earlier.at).as_secs_f64();
+        let counts = [now.messages - then.messages, now.bytes - then.bytes, now.places - then.places];
+        let rates = |seconds: f64| {
+            let [messages, bytes, places] = counts.map(|count| count as f64 / seconds);
+            format!("{messages:.0} messages, {bytes:.0} bytes, {places:.1} updates")
+        };
+        let mut text = format!(
+            "{} connecting, {} connected, {} closed, {} failed, {} maps whole; {} a second",
+            now.connecting,
+            now.connected,
+            now.closed,
+            now.failed,
+            now.converged,
+            rates(seconds)
+        );
+        if let (Some(now), Some(then)) = (self.computing, earlier.computing) {
+            let computing = (now - then).as_secs_f64();
+            text += &format!("; {:.1} % of a core, on a whole one {}", computing / seconds * 100.0, rates(computing));
+        }
+        text + &format!("; {} frames lost, {} damaged", now.lost - then.lost, now.damaged - then.damaged)
+    }
+}
+
+/// The process in which recorded robots speak; it ends with this one.
+struct Crowd(Child);
+
+impl Crowd {
+    /// Starts it, and gives the address at which its robots are.
+    fn start(count: u32, speed: f64) -> anyhow::Result<(Self, String)> {
+        let mut crowd = Command::new(std::env::current_exe()?)
+            .args(["robots", "--listen", "127.0.0.1:0"])
+            .args(["--count", &count.to_string(), "--speed", &speed.to_string()])
+            .stdin(Stdio::null())
+            .stdout(Stdio::piped())
+            .spawn()
+            .context("starting the robots")?;
+        let output = crowd.stdout.take();
+        let crowd = Self(crowd);
+        let mut said = String::new();
+        BufReader::new(output.context("the robots have no output")?).read_line(&mut said)?;
+        let (_, address) = said.trim_end().split_once("tcp:").context("the robots did not say where they are")?;
+        Ok((crowd, address.to_owned()))
+    }
+}
+
+impl Drop for Crowd {
+    fn drop(&mut self) {
+        // It may have ended already.
+        let _ = self.0.kill();
+        let _ = self.0.wait();
+    }
+}
+
+/// The name and the address of each robot.
+fn lines_of(text: &str) -> anyhow::Result<Vec<(String, String)>> {
+    let mut lines = Vec::new();
+    for line in text.lines().map(str::trim).filter(|line| !line.is_empty() && !line.starts_with('#')) {
+        let (line, name) = line.split_once(char::is_whitespace).unwrap_or((line, line));
+        let address = line.strip_prefix("tcp:").with_context(|| format!("{line}: not tcp:HOST:PORT"))?;
+        lines.push((name.trim().to_owned(), address.to_owned()));
+    }
+    ensure!(!lines.is_empty(), "there is no robot to listen to");
+    Ok(lines)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_file_names_robots_and_where_they_are() {
+        let lines = lines_of("# hall\ntcp:10.0.0.1:7070 first robot\n\n  tcp:localhost:7071\n").unwrap();
+        let expected = [("first robot", "10.0.0.1:7070"), ("tcp:localhost:7071", "localhost:7071")];
+        assert_eq!(lines, expected.map(|(name, address)| (name.to_owned(), address.to_owned())));
+        assert!(lines_of("# nobody\n").is_err());
+        assert!(lines_of("/dev/ttyUSB0\n").unwrap_err().to_string().contains("tcp:HOST:PORT"));
+    }
+}

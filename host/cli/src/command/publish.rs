@@ -1,0 +1,72 @@
+//! `toposlam publish`: tell an MQTT broker all that a robot says.
+
+use std::sync::mpsc::channel;
+use std::sync::{Arc, Mutex, PoisonError};
+use std::time::{Duration, Instant};
+
+use clap::Args;
+use toposlam_cli::publish::{Broker, BrokerNews, Options, Publisher};
+use toposlam_link::link::{Link, News, Options as LinkOptions, Source};
+
+use super::interrupt::Interrupt;
+
+/// How soon the end is noticed.
+const TURN: Duration = Duration::from_millis(50);
+
+/// Arguments of `toposlam publish`.
+#[derive(Args)]
+pub(crate) struct Arguments {
+    /// The robot's line: a serial port, tcp:HOST:PORT, or - for bytes on the standard input.
+    line: String,
+    /// The broker: mqtt://HOST:PORT, or mqtt://USER:PASSWORD@HOST:PORT.
+    #[arg(long)]
+    broker: Broker,
+    /// The robot's name: the topics are toposlam/NAME/events, /map and /status.
+    #[arg(long)]
+    robot: String,
+    /// Publish the frames of the line as well, as toposlam/NAME/frames.
+    #[arg(long)]
+    frames: bool,
+    /// The speed of a serial port.
+    #[arg(long, default_value_t = 115_200)]
+    baud: u32,
+    /// Stop after so many seconds; without it, at Ctrl-C or at the end of the standard input.
+    #[arg(long)]
+    seconds: Option<u64>,
+}
+
+pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
+    let mut options = Options::new(arguments.broker.clone(), &arguments.robot)?;
+    options.frames = arguments.frames;
+    let publisher = Publisher::start(options, |news| match news {
+        BrokerNews::Connected => eprintln!("the broker is connected"),
+        BrokerNews::Disconnected(reason) => eprintln!("the broker is away: {reason}"),
+    });
+    let publisher = Arc::new(Mutex::new(Some(publisher)));
+    let interrupt = Interrupt::watch()?;
+    let (sender, ended) = channel();
+    let teller = Arc::clone(&publisher);
+    let source = Source::named(&arguments.line, arguments.baud);
+    let link = Link::start(source, LinkOptions::default(), move |news| {
+        match &news {
+            News::Connected => eprintln!("the robot is connected"),
+            News::Disconnected(reason) => eprintln!("the robot is away: {reason}"),
+            _ => {}
+        }
+        let mut publisher = teller.lock().unwrap_or_else(PoisonError::into_inner);
+        let Some(publisher) = publisher.as_mut() else { return false };
+        publisher.hear(&news);
+        // It matters only to one who still waits.
+        !matches!(news, News::Ended) || sender.send(()).is_ok()
+    });
+    let end = arguments.seconds.map(|seconds| Instant::now() + Duration::from_secs(seconds));
+    let is_over = || interrupt.is_told() || end.is_some_and(|end| Instant::now() >= end);
+    while !is_over() && ended.recv_timeout(TURN).is_err() {}
+    drop(link);
+    // Dropping it here and not in the link's thread lets it say its last words.
+    let Some(publisher) = publisher.lock().unwrap_or_else(PoisonError::into_inner).take() else { return Ok(()) };
+    let counters = publisher.counters();
+    drop(publisher);
+    println!("{} published, {} dropped", counters.published, counters.dropped);
+    Ok(())
+}

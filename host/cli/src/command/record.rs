@@ -1,0 +1,81 @@
+//! `toposlam record`: keep what a robot says in a file.
+
+use std::io::ErrorKind;
+use std::path::PathBuf;
+use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
+
+use anyhow::Context;
+use clap::Args;
+use toposlam_link::line::{Line, open};
+use toposlam_link::log::Recorder;
+
+use super::interrupt::Interrupt;
+
+const BUFFER_BYTES: usize = 4096;
+
+/// Arguments of `toposlam record`.
+#[derive(Args)]
+pub(crate) struct Arguments {
+    /// The robot's line: a serial port, or tcp:HOST:PORT.
+    line: String,
+    /// The recording, an MCAP file that does not exist yet.
+    file: PathBuf,
+    /// The speed of a serial port.
+    #[arg(long, default_value_t = 115_200)]
+    baud: u32,
+    /// Stop after so many seconds; without it, at Ctrl-C or at the end of the line.
+    #[arg(long)]
+    seconds: Option<u64>,
+    /// Stop when the robot has found so many places.
+    #[arg(long)]
+    places: Option<u32>,
+}
+
+pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
+    let mut line = open(&arguments.line, arguments.baud)?;
+    let file = &arguments.file;
+    let mut recorder = Recorder::create(file).with_context(|| format!("making {}", file.display()))?;
+    let interrupt = Interrupt::watch()?;
+    // The clock of the computer may be set meanwhile; the times of the recording go on evenly.
+    let start = Instant::now();
+    let start_time = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default();
+    let end = arguments.seconds.map(Duration::from_secs);
+    let is_over = |places: u32| {
+        interrupt.is_told()
+            || end.is_some_and(|end| start.elapsed() >= end)
+            || arguments.places.is_some_and(|wanted| places >= wanted)
+    };
+    let mut lost = None;
+    while lost.is_none() && !is_over(recorder.summary().places) {
+        let mut buffer = [0; BUFFER_BYTES];
+        match read(&mut line, &mut buffer) {
+            Ok(bytes) => recorder.hear(bytes, (start_time + start.elapsed()).as_nanos() as u64)?,
+            Err(error) => lost = Some(error),
+        }
+    }
+    let summary = recorder.finish()?;
+    println!(
+        "{}: {} frames of {} bytes in {:.1} s, {} places",
+        file.display(),
+        summary.frames,
+        summary.bytes,
+        start.elapsed().as_secs_f64(),
+        summary.places
+    );
+    match lost {
+        Some(error) if error.kind() != ErrorKind::UnexpectedEof => Err(error).context("the line to the robot failed"),
+        _ => Ok(()),
+    }
+}
+
+/// What came, if anything; the end of the line is an error.
+fn read<'buffer>(line: &mut Box<dyn Line>, buffer: &'buffer mut [u8]) -> std::io::Result<&'buffer [u8]> {
+    match line.read(buffer) {
+        Ok(0) => Err(ErrorKind::UnexpectedEof.into()),
+        Ok(count) => Ok(&buffer[..count]),
+        Err(error) if matches!(error.kind(), ErrorKind::WouldBlock | ErrorKind::TimedOut | ErrorKind::Interrupted) => {
+            Ok(&[])
+        }
+        Err(error) => Err(error),
+    }
+}

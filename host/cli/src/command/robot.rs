@@ -1,0 +1,65 @@
+//! `toposlam robot`: a simulated robot at the other end of a TCP line, for whoever has no robot at hand.
+
+use std::time::{Duration, Instant};
+
+use anyhow::Context;
+use clap::Args;
+use toposlam::reference::SNAPSHOT_BYTES;
+use toposlam_link::broadcast::Broadcast;
+use toposlam_sim::exploration::Exploration;
+use toposlam_sim::world::RobotModel;
+
+use super::drive::{load_plan, noise_factor};
+
+/// Ring frames in a second of the robot's time.
+const FRAMES_PER_SECOND: f64 = 10.0;
+
+/// Arguments of `toposlam robot`.
+#[derive(Args)]
+pub(crate) struct Arguments {
+    /// Where to listen, HOST:PORT.
+    #[arg(long, default_value = "127.0.0.1:7070")]
+    listen: String,
+    /// Floor plan: ring, office, flat, or a file.
+    #[arg(long, default_value = "office")]
+    plan: String,
+    /// Seed of the drive and of every noise.
+    #[arg(long, default_value_t = 1)]
+    seed: u64,
+    /// Every noise of the robot, multiplied by this.
+    #[arg(long, default_value_t = 1.0, value_parser = noise_factor)]
+    noise: f64,
+    /// How much faster than a real robot it lives, 0.01 to 1000.
+    #[arg(long, default_value_t = 1.0, value_parser = speed)]
+    speed: f64,
+    /// Stop after this many places; 0: never.
+    #[arg(long, default_value_t = 0)]
+    places: usize,
+}
+
+/// A pace, 1 being that of a clock.
+pub(super) fn speed(text: &str) -> Result<f64, String> {
+    let speed = text.parse().map_err(|error| format!("{error}"))?;
+    if (0.01..=1000.0).contains(&speed) { Ok(speed) } else { Err("must be 0.01 to 1000".to_owned()) }
+}
+
+pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
+    let plan = load_plan(&arguments.plan)?;
+    let mut buffer = [0; SNAPSHOT_BYTES];
+    let model = RobotModel::default().with_noise(arguments.noise);
+    let mut exploration = Exploration::start(&plan, model, arguments.seed, &mut buffer)?;
+    let mut broadcast =
+        Broadcast::bind(&arguments.listen).with_context(|| format!("listening at {}", arguments.listen))?;
+    println!("a simulated robot listens at tcp:{}", broadcast.address()?);
+    let frame_time = Duration::from_secs_f64(1.0 / (FRAMES_PER_SECOND * arguments.speed));
+    let mut next_frame = Instant::now();
+    while arguments.places == 0 || exploration.places() < arguments.places {
+        exploration.advance();
+        let board = exploration.board();
+        let heard = broadcast.exchange(&board.sent);
+        board.received.extend(heard);
+        next_frame += frame_time;
+        std::thread::sleep(next_frame.saturating_duration_since(Instant::now()));
+    }
+    Ok(())
+}

@@ -1,0 +1,60 @@
+//! `toposlam robots`: many recorded robots at one TCP port, for `toposlam fleet --simulate`.
+
+use std::time::{Duration, Instant};
+
+use anyhow::Context;
+use clap::Args;
+use toposlam_cli::fleet::cost::allow_many_connections;
+use toposlam_cli::fleet::crowd::{Afterwards, Crowd, Life, Pace};
+
+use super::drive::load_plan;
+
+/// The lives, each a plan and the seed of its drive.
+const LIVES: [(&str, u64); 2] = [("office", 1), ("ring", 2)];
+/// How often robots live on. It is shorter than a ring frame, so that they do not all speak at once.
+const TURN: Duration = Duration::from_millis(5);
+
+/// Arguments of `toposlam robots`.
+#[derive(Args)]
+pub(crate) struct Arguments {
+    /// How many robots.
+    #[arg(long, value_parser = clap::value_parser!(u32).range(1..))]
+    count: u32,
+    /// Where to listen, HOST:PORT.
+    #[arg(long, default_value = "127.0.0.1:7070")]
+    listen: String,
+    /// How much faster than real robots they live; 0: as fast as they are listened to.
+    #[arg(long, default_value_t = 1.0, value_parser = pace)]
+    speed: f64,
+    /// How many ring frames are recorded of each life.
+    #[arg(long, default_value_t = 6000, value_parser = clap::value_parser!(u32).range(1..))]
+    frames: u32,
+}
+
+/// A pace, 1 being that of a clock and 0 as fast as possible.
+pub(super) fn pace(text: &str) -> Result<f64, String> {
+    if text == "0" { Ok(0.0) } else { super::robot::speed(text) }
+}
+
+pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
+    allow_many_connections().context("opening many connections")?;
+    let mut lives = Vec::new();
+    for (plan, seed) in LIVES {
+        let life = Life::record(&load_plan(plan)?, seed, arguments.frames as usize)?;
+        eprintln!("recorded {plan}: {} ring frames, {} bytes", life.frames(), life.bytes());
+        lives.push(life);
+    }
+    let pace = if arguments.speed == 0.0 { Pace::Unbounded } else { Pace::Times(arguments.speed) };
+    let mut crowd = Crowd::bind(&arguments.listen, lives, arguments.count as usize, Afterwards::Again)
+        .with_context(|| format!("listening at {}", arguments.listen))?;
+    println!("{} robots listen at tcp:{}", arguments.count, crowd.address()?);
+    let mut lived = Instant::now();
+    while crowd.met() == 0 || crowd.heard() > 0 {
+        let time = lived.elapsed();
+        lived += time;
+        if crowd.live(time, pace) == 0 || pace != Pace::Unbounded {
+            std::thread::sleep(TURN.saturating_sub(lived.elapsed()));
+        }
+    }
+    Ok(())
+}

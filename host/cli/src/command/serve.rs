@@ -1,0 +1,46 @@
+//! `toposlam serve`: show the live map of a robot in browsers.
+
+use anyhow::Context;
+use clap::Args;
+use toposlam_cli::serve::follow;
+use toposlam_cli::serve::server::{Options, Server};
+use toposlam_cli::serve::state::State;
+use toposlam_link::link;
+use toposlam_link::watch::Watch;
+
+/// Arguments of `toposlam serve`.
+#[derive(Args)]
+pub(crate) struct Arguments {
+    /// The robot's line: a serial port, tcp:HOST:PORT, or - for bytes on the standard input.
+    line: String,
+    /// The speed of a serial port.
+    #[arg(long, default_value_t = 115_200)]
+    baud: u32,
+    /// Where to serve the page, HOST:PORT; port 0 is any free one.
+    #[arg(long, default_value = "127.0.0.1:8080")]
+    listen: String,
+    /// A name of this computer that browsers may call it by, beside its addresses and localhost; may be repeated.
+    #[arg(long = "name", value_name = "NAME")]
+    names: Vec<String>,
+}
+
+pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
+    let Arguments { line, baud, listen, names } = arguments;
+    let options = Options { names: names.clone(), ..Options::default() };
+    let server = Server::bind(listen, options, &State::of(&mut Watch::new(line)))
+        .with_context(|| format!("serving at {listen}"))?;
+    let address = server.address();
+    if !address.ip().to_canonical().is_loopback() {
+        eprintln!("warning: whoever reaches {address} sees the robot's map: there is no password and no encryption");
+    }
+    if address.ip().is_unspecified() {
+        println!("the map is at http://localhost:{}/", address.port());
+    } else {
+        println!("the map is at http://{address}/");
+    }
+    follow(line, *baud, link::Options::default(), &server);
+    eprintln!("the input has ended; the page stays until this program is stopped");
+    loop {
+        std::thread::park();
+    }
+}

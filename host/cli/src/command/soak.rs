@@ -1,0 +1,43 @@
+//! `toposlam soak`: hours of a robot's life, with faults and an operator, in little time.
+
+use anyhow::ensure;
+use clap::Args;
+use toposlam_eval::soak::{Soak, TURNS_PER_HOUR};
+use toposlam_sim::injector::FaultRates;
+use toposlam_sim::world::RobotModel;
+
+use super::drive::{fault_rate, load_plan, noise_factor};
+
+/// Arguments of `toposlam soak`.
+#[derive(Args)]
+pub(crate) struct Arguments {
+    /// Floor plan: ring, office, flat, or a file.
+    #[arg(long, default_value = "office")]
+    plan: String,
+    /// Seed of the world, of every noise and of the faults.
+    #[arg(long, default_value_t = 1)]
+    seed: u64,
+    /// Every noise of the robot, multiplied by this.
+    #[arg(long, default_value_t = 1.0, value_parser = noise_factor)]
+    noise: f64,
+    /// Simulated hours, ten turns of the robot's loop a second.
+    #[arg(long, default_value_t = 24)]
+    hours: u64,
+    /// Faults of the ring and the line, 0 to 1: the probability that a sonar's answer is lost; the others follow (docs/faults.md).
+    #[arg(long, default_value_t = 0.01, value_parser = fault_rate)]
+    faults: f64,
+}
+
+pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
+    let model = RobotModel::default().with_noise(arguments.noise);
+    let rates = FaultRates::scaled(arguments.faults);
+    let soak = Soak { model, rates, seed: arguments.seed, turns: arguments.hours.saturating_mul(TURNS_PER_HOUR) };
+    let life = soak.run(&load_plan(&arguments.plan)?)?;
+    for line in life.lines() {
+        println!("{line}");
+    }
+    let mistakes = life.mistakes();
+    ensure!(mistakes.is_empty(), "{}", mistakes.join("; "));
+    println!("nothing was lost, and every fault that can be counted was counted");
+    Ok(())
+}

@@ -1,0 +1,400 @@
+//! Runs the firmware in an emulated STM32F405 and plays the world around it.
+//!
+//! QEMU's USART2 leads to the model of the sensor bus, USART1 to the caller. The emulator's machine has no I2C, so the
+//! firmware reaches its sensors through the SC18IM700 bridge, byte for byte as on a robot.
+
+use std::{
+    fs,
+    io::{self, Read, Write},
+    net::{TcpListener, TcpStream},
+    ops::ControlFlow,
+    path::{Path, PathBuf},
+    process::{Child, Command, ExitStatus, Stdio},
+    sync::{
+        Arc, Mutex,
+        atomic::{AtomicBool, AtomicU64, Ordering},
+    },
+    thread,
+    time::{Duration, Instant},
+};
+
+use anyhow::{Context, bail};
+use toposlam::ring::RingFrame;
+
+use toposlam_sim::chip::Srf08Bank;
+use toposlam_sim::injector::{BridgeCounts, FaultRates, FaultyBridge};
+
+/// The RAM of the STM32F405 that the stack grows down in.
+const RAM_START: u32 = 0x2000_0000;
+const RAM_BYTES: usize = 128 * 1024;
+/// What `cortex-m-rt` paints the stack with before `main`.
+const STACK_PAINT: [u8; 4] = 0xCCCC_CCCC_u32.to_le_bytes();
+const BUFFER_BYTES: usize = 4096;
+/// The firmware waits for a byte that was lost until it has been woken so many times; the clock alone takes 20 s for that. With
+/// faults, zeros on USART1 wake it whenever the line to the bridge was quiet for this long: between frames zeros mean nothing.
+const WAKE_AFTER: Duration = Duration::from_millis(1);
+/// Computers do not wait for less than some four milliseconds; so many zeros each time bring a lost byte down to a quarter of a
+/// second.
+const WAKE: [u8; 4] = [0; 4];
+
+/// What to run and for how long.
+#[derive(Clone, Debug)]
+pub struct Emulation {
+    /// The emulator, a name on the search path or a file.
+    pub qemu: PathBuf,
+    /// The firmware image, as it would be flashed.
+    pub elf: PathBuf,
+    /// How often a sonar reads as still ranging before it answers.
+    pub ranging_polls: u32,
+    /// The whole run is given up after this long.
+    pub timeout: Duration,
+    /// How many frames without any sensor follow the last frame of the world, so that the firmware can repeat what it
+    /// has to say; then the sensor bus falls silent.
+    pub blind_frames: u64,
+    /// After that the run ends when USART1 has been quiet for this long.
+    pub quiet: Duration,
+    /// Faults between the firmware and its sensors, from the world's first frame to its last.
+    pub faults: FaultRates,
+    /// The seed of the faults.
+    pub fault_seed: u64,
+}
+
+impl Emulation {
+    /// The firmware in the emulator found on the search path, given up after ten minutes.
+    pub fn new(elf: impl Into<PathBuf>) -> Self {
+        Self {
+            qemu: "qemu-system-arm".into(),
+            elf: elf.into(),
+            ranging_polls: 0,
+            timeout: Duration::from_secs(600),
+            blind_frames: 64,
+            quiet: Duration::from_millis(500),
+            faults: FaultRates::NONE,
+            fault_seed: 0,
+        }
+    }
+
+    /// Runs the firmware in the world until the frames are used up and USART1 is quiet, or `received` breaks off, or the
+    /// firmware ends on its own. `received` gets what the firmware sends on USART1, in pieces of any length; what it puts into its
+    /// second argument is sent to the firmware.
+    ///
+    /// # Errors
+    /// When the emulator cannot be started or talked to, when the firmware ends with a failure (a panic or a hard
+    /// fault), and when the time is up.
+    pub fn run(
+        &self,
+        frames: impl FnMut() -> Option<RingFrame<16>> + Send,
+        mut received: impl FnMut(&[u8], &mut Vec<u8>) -> ControlFlow<()>,
+    ) -> anyhow::Result<Outcome> {
+        if !self.elf.is_file() {
+            bail!("no firmware image at {}: build it with `cargo firmware`", self.elf.display());
+        }
+        let started = Instant::now();
+        let deadline = started + self.timeout;
+        let [usart1, usart2, monitor] = [listen()?, listen()?, listen()?];
+        let mut machine = Machine::start(&self.qemu, &self.elf, [&usart1, &usart2, &monitor])?;
+        let mut usart1 = machine.accept(&usart1, deadline)?;
+        let usart2 = machine.accept(&usart2, deadline)?;
+        let monitor = machine.accept(&monitor, deadline)?;
+
+        let progress = Arc::new(Progress::default());
+        let to_firmware = Mutex::new(usart1.try_clone()?);
+        let (ending, bridge) = thread::scope(|scope| {
+            let stop = usart2.try_clone()?;
+            let bus = scope.spawn(|| self.play_bus(usart2, frames, &progress, &to_firmware));
+            let ending =
+                self.listen_until_the_end(&mut machine, &mut usart1, &progress, deadline, &to_firmware, &mut received);
+            // Closing the line ends the thread that waits on it.
+            let _ = stop.shutdown(std::net::Shutdown::Both);
+            match bus.join() {
+                Ok(counts) => ending.map(|ending| (ending, counts)),
+                Err(_) => bail!("the model of the sensor bus failed"),
+            }
+        })?;
+        let stack_high_water_bytes = if ending.is_running() { stack_high_water(monitor).ok() } else { None };
+        machine.end();
+        match ending {
+            Ending::Exited(status) if !status.success() => {
+                bail!("the firmware ended with a failure (a panic or a hard fault); the emulator's {status}")
+            }
+            Ending::Exited(_) | Ending::WorldOver | Ending::BrokenOff => Ok(Outcome {
+                ending,
+                frames: progress.frames.load(Ordering::Relaxed),
+                bus_bytes: progress.bus_bytes.load(Ordering::Relaxed),
+                stack_high_water_bytes,
+                bridge,
+                seconds: started.elapsed().as_secs_f64(),
+            }),
+        }
+    }
+
+    /// Answers the firmware's bytes on USART2 as the bridge and the rangers behind it would, until the line closes.
+    fn play_bus(
+        &self,
+        line: TcpStream,
+        frames: impl FnMut() -> Option<RingFrame<16>>,
+        progress: &Progress,
+        to_firmware: &Mutex<TcpStream>,
+    ) -> BridgeCounts {
+        let mut bridge = FaultyBridge::new(Srf08Bank::new(frames, self.ranging_polls), self.faults, self.fault_seed);
+        // The line fails when the emulator ends.
+        let _ = self.answer_bus(line, &mut bridge, progress, to_firmware);
+        bridge.counts()
+    }
+
+    fn answer_bus<WORLD: FnMut() -> Option<RingFrame<16>>>(
+        &self,
+        mut line: TcpStream,
+        bridge: &mut FaultyBridge<Srf08Bank<WORLD>>,
+        progress: &Progress,
+        to_firmware: &Mutex<TcpStream>,
+    ) -> io::Result<()> {
+        let has_faults = self.faults != FaultRates::NONE;
+        line.set_read_timeout(has_faults.then_some(WAKE_AFTER))?;
+        let mut buffer = [0; BUFFER_BYTES];
+        loop {
+            let count = match line.read(&mut buffer) {
+                Ok(0) => return Ok(()),
+                Ok(count) => count,
+                Err(error) if is_timeout(&error) => {
+                    if bridge.devices().frames() > 0 {
+                        send(to_firmware, &WAKE)?;
+                    }
+                    continue;
+                }
+                Err(error) => return Err(error),
+            };
+            let answer: Vec<u8> = buffer[..count].iter().flat_map(|&byte| bridge.byte(byte)).collect();
+            let (frames, blind_frames) = (bridge.devices().frames(), bridge.devices().blind_frames());
+            bridge.set_faulty(has_faults && frames > 0 && blind_frames == 0);
+            progress.bus_bytes.fetch_add(count as u64, Ordering::Relaxed);
+            progress.frames.store(frames, Ordering::Relaxed);
+            if blind_frames > self.blind_frames {
+                progress.world_over.store(true, Ordering::Release);
+            } else if !answer.is_empty() {
+                line.write_all(&answer)?;
+            }
+        }
+    }
+
+    fn listen_until_the_end(
+        &self,
+        machine: &mut Machine,
+        usart1: &mut TcpStream,
+        progress: &Progress,
+        deadline: Instant,
+        to_firmware: &Mutex<TcpStream>,
+        received: &mut impl FnMut(&[u8], &mut Vec<u8>) -> ControlFlow<()>,
+    ) -> anyhow::Result<Ending> {
+        usart1.set_read_timeout(Some(Duration::from_millis(20)))?;
+        let mut buffer = [0; BUFFER_BYTES];
+        let mut answer = Vec::new();
+        let mut last_byte = Instant::now();
+        loop {
+            match usart1.read(&mut buffer) {
+                Ok(0) => return machine.wait_for_exit(deadline),
+                Ok(count) => {
+                    last_byte = Instant::now();
+                    if received(&buffer[..count], &mut answer).is_break() {
+                        return Ok(Ending::BrokenOff);
+                    }
+                    send(to_firmware, &answer).context("writing USART1")?;
+                    answer.clear();
+                }
+                Err(error) if is_timeout(&error) => {}
+                Err(error) if error.kind() == io::ErrorKind::ConnectionReset => return machine.wait_for_exit(deadline),
+                Err(error) => return Err(error).context("reading USART1"),
+            }
+            let now = Instant::now();
+            if !progress.world_over.load(Ordering::Acquire) {
+                // The quiet time counts from the end of the world at the earliest.
+                last_byte = now;
+            } else if now.duration_since(last_byte) >= self.quiet {
+                return Ok(Ending::WorldOver);
+            }
+            if now >= deadline {
+                bail!(
+                    "the emulation was not over after {} s; the firmware had read {} frames",
+                    self.timeout.as_secs(),
+                    progress.frames.load(Ordering::Relaxed)
+                );
+            }
+        }
+    }
+}
+
+/// Why a run ended.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Ending {
+    /// The frames were used up and the firmware had no more to say.
+    WorldOver,
+    /// The caller broke it off.
+    BrokenOff,
+    /// The firmware ended the emulator itself.
+    Exited(ExitStatus),
+}
+
+impl Ending {
+    fn is_running(self) -> bool {
+        !matches!(self, Self::Exited(_))
+    }
+}
+
+/// How a run went.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Outcome {
+    /// Why it ended.
+    pub ending: Ending,
+    /// How many ring frames the firmware read.
+    pub frames: u64,
+    /// How many bytes the firmware sent to the sensor bus.
+    pub bus_bytes: u64,
+    /// The most stack that the firmware ever used, from the paint that is left.
+    pub stack_high_water_bytes: Option<usize>,
+    /// What was done between the firmware and its sensors.
+    pub bridge: BridgeCounts,
+    /// How long the run took on this computer.
+    pub seconds: f64,
+}
+
+#[derive(Default)]
+struct Progress {
+    frames: AtomicU64,
+    bus_bytes: AtomicU64,
+    world_over: AtomicBool,
+}
+
+/// The running emulator; it is killed when it is dropped.
+struct Machine {
+    child: Child,
+}
+
+impl Machine {
+    fn start(qemu: &Path, elf: &Path, lines: [&TcpListener; 3]) -> anyhow::Result<Self> {
+        let mut command = Command::new(qemu);
+        command.args(["-M", "netduinoplus2", "-display", "none"]);
+        command.args(["-semihosting-config", "enable=on,target=native"]);
+        for (option, line) in ["-serial", "-serial", "-monitor"].into_iter().zip(lines) {
+            command.arg(option).arg(format!("tcp:{},nodelay=on", line.local_addr()?));
+        }
+        command.arg("-kernel").arg(elf).stdin(Stdio::null()).stdout(Stdio::null());
+        let child = command.spawn().with_context(|| {
+            format!("starting the emulator {}; on Debian it is in the package qemu-system-arm", qemu.display())
+        })?;
+        Ok(Self { child })
+    }
+
+    fn accept(&mut self, listener: &TcpListener, deadline: Instant) -> anyhow::Result<TcpStream> {
+        listener.set_nonblocking(true)?;
+        loop {
+            match listener.accept() {
+                Ok((stream, _)) => {
+                    stream.set_nonblocking(false)?;
+                    stream.set_nodelay(true)?;
+                    return Ok(stream);
+                }
+                Err(error) if error.kind() == io::ErrorKind::WouldBlock => {}
+                Err(error) => return Err(error).context("waiting for the emulator"),
+            }
+            if let Some(status) = self.child.try_wait()? {
+                bail!("the emulator ended before it connected: {status}");
+            }
+            if Instant::now() >= deadline {
+                bail!("the emulator did not connect in time");
+            }
+            thread::sleep(Duration::from_millis(5));
+        }
+    }
+
+    fn wait_for_exit(&mut self, deadline: Instant) -> anyhow::Result<Ending> {
+        loop {
+            if let Some(status) = self.child.try_wait()? {
+                return Ok(Ending::Exited(status));
+            }
+            if Instant::now() >= deadline {
+                bail!("the emulator closed its lines but did not end");
+            }
+            thread::sleep(Duration::from_millis(5));
+        }
+    }
+
+    fn end(mut self) {
+        self.kill();
+    }
+
+    fn kill(&mut self) {
+        // Either fails only when the emulator has ended already.
+        let _ = self.child.kill();
+        let _ = self.child.wait();
+    }
+}
+
+impl Drop for Machine {
+    fn drop(&mut self) {
+        self.kill();
+    }
+}
+
+fn listen() -> anyhow::Result<TcpListener> {
+    TcpListener::bind("127.0.0.1:0").context("opening a local port for the emulator")
+}
+
+/// Writes all of some bytes at once, so that nobody else's come in between.
+fn send(line: &Mutex<TcpStream>, bytes: &[u8]) -> io::Result<()> {
+    let mut line = line.lock().map_err(|_| io::Error::other("another thread failed"))?;
+    line.write_all(bytes)
+}
+
+fn is_timeout(error: &io::Error) -> bool {
+    matches!(error.kind(), io::ErrorKind::WouldBlock | io::ErrorKind::TimedOut | io::ErrorKind::Interrupted)
+}
+
+/// Reads the machine's RAM through QEMU's monitor and finds how deep the stack ever was.
+fn stack_high_water(mut monitor: TcpStream) -> anyhow::Result<usize> {
+    monitor.set_read_timeout(Some(Duration::from_secs(10)))?;
+    let dump =
+        std::env::temp_dir().join(format!("toposlam-ram-{}-{}", std::process::id(), monitor.local_addr()?.port()));
+    writeln!(monitor, "stop")?;
+    writeln!(monitor, "pmemsave {RAM_START:#x} {RAM_BYTES} \"{}\"", dump.display())?;
+    writeln!(monitor, "quit")?;
+    // The monitor closes the line when it has done all of it.
+    let mut said = Vec::new();
+    let _ = monitor.read_to_end(&mut said);
+    let ram = fs::read(&dump).context("reading the machine's memory")?;
+    let _ = fs::remove_file(&dump);
+    painted_stack(&ram).context("the stack is not painted")
+}
+
+/// The bytes above the longest stretch of paint in an image of the RAM: what the stack has used from the top.
+fn painted_stack(ram: &[u8]) -> Option<usize> {
+    let (mut longest, mut end_of_longest, mut run) = (0, 0, 0);
+    for (index, word) in ram.chunks_exact(4).enumerate() {
+        run = if word == STACK_PAINT { run + 1 } else { 0 };
+        if run > longest {
+            (longest, end_of_longest) = (run, (index + 1) * 4);
+        }
+    }
+    (longest > 0).then(|| ram.len() - end_of_longest)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_stack_reaches_from_the_top_down_to_the_longest_stretch_of_paint() {
+        let mut ram = vec![0; 64];
+        ram[4..8].copy_from_slice(&STACK_PAINT);
+        for word in ram[16..40].chunks_exact_mut(4) {
+            word.copy_from_slice(&STACK_PAINT);
+        }
+        assert_eq!(painted_stack(&ram), Some(24));
+        assert_eq!(painted_stack(&[0; 64]), None);
+    }
+
+    #[test]
+    fn a_missing_image_is_an_error_that_says_how_to_build_it() {
+        let error = Emulation::new("no-such-image").run(|| None, |_, _| ControlFlow::Continue(())).unwrap_err();
+        assert!(error.to_string().contains("cargo firmware"));
+    }
+}

@@ -1,0 +1,296 @@
+//! Many robots, one listener: a thread that hears a thousand TCP lines.
+//!
+//! | Part | Is |
+//! |---|---|
+//! | [`Fleet`] | the listening side: a [`Listener`] for each robot, fed when its line has something |
+//! | [`crowd`] | the robots' side for trying and measuring: recorded robots that speak again and again |
+//! | [`cost`] | what this process has used of the computer |
+//!
+//! ```
+//! use std::{io::Write, net::TcpListener, time::Duration};
+//! use toposlam::wire::{Encoder, MAX_FRAME_BYTES, Message};
+//! use toposlam_cli::fleet::Fleet;
+//!
+//! let robot = TcpListener::bind("127.0.0.1:0")?;
+//! let mut fleet = Fleet::new()?;
+//! fleet.connect("kitchen", &robot.local_addr()?.to_string());
+//! let edge = Message::Edge { a: 0, b: 1, present: true };
+//! robot.accept()?.0.write_all(Encoder::new(0).encode(&edge, &mut [0; MAX_FRAME_BYTES])?)?;
+//! while fleet.totals().messages == 0 {
+//!     fleet.listen(Duration::from_millis(10), |_, _, _| ())?;
+//! }
+//! assert_eq!(fleet.robots()[0].listener().map().edges, [(0, 1)]);
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+
+pub mod cost;
+pub mod crowd;
+
+use std::io::{self, ErrorKind, Read};
+use std::net::ToSocketAddrs;
+use std::time::Duration;
+
+use mio::net::TcpStream;
+use mio::{Events, Interest, Poll, Token};
+use toposlam::wire::Message;
+
+use toposlam_link::listener::{Event, Listener};
+
+/// What is read of one robot before the next one has its turn.
+const READ_BYTES: usize = 1 << 14;
+/// How many robots are told of in one look at all lines.
+const EVENTS: usize = 1024;
+/// On epoll and kqueue a read that does not fill the buffer has emptied the line; elsewhere only one that would wait has.
+const SHORT_READ_EMPTIES: bool = cfg!(any(target_os = "linux", target_os = "android", target_vendor = "apple"));
+
+/// One listener to many robots.
+///
+/// Memory: [`Robot`] a robot and one buffer for all, and what the system keeps for a TCP connection. A robot that fails,
+/// goes away or sends what is no message does not disturb the others; it is not connected again.
+pub struct Fleet {
+    poll: Poll,
+    events: Events,
+    robots: Vec<Robot>,
+    /// Robots with something left to read.
+    ready: Vec<usize>,
+    buffer: Box<[u8]>,
+}
+
+/// One robot of a fleet.
+#[derive(Debug)]
+pub struct Robot {
+    name: Box<str>,
+    line: Line,
+    is_ready: bool,
+    /// The robot has closed its end; what it said before is still to be read.
+    is_ending: bool,
+    listener: Listener,
+    bytes: u64,
+    places: u64,
+}
+
+/// The state of a robot's line.
+#[derive(Debug)]
+enum Line {
+    Opening(TcpStream),
+    Open(TcpStream),
+    Ended(End),
+}
+
+/// Why a robot is not heard any more.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum End {
+    /// The robot closed the line.
+    Closed,
+    /// The line could not be opened, or failed.
+    Failed(ErrorKind),
+}
+
+/// A fleet in numbers. Counts are since the start.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Totals {
+    /// Robots that have not answered yet.
+    pub connecting: usize,
+    /// Robots whose line is open.
+    pub connected: usize,
+    /// Robots that closed their line.
+    pub closed: usize,
+    /// Robots whose line could not be opened, or failed.
+    pub failed: usize,
+    /// Robots whose map is known to be heard whole, whether or not their line is still open.
+    pub converged: usize,
+    /// Messages.
+    pub messages: u64,
+    /// Bytes, whatever they were.
+    pub bytes: u64,
+    /// Places that the robots found: each is an update of a map.
+    pub places: u64,
+    /// Frames that are missing.
+    pub lost: u64,
+    /// Frames that were no message: damaged, or of another release.
+    pub damaged: u64,
+}
+
+impl Fleet {
+    /// A fleet of no robots.
+    ///
+    /// # Errors
+    /// When the system lets nobody wait for many lines.
+    pub fn new() -> io::Result<Self> {
+        Ok(Self {
+            poll: Poll::new()?,
+            events: Events::with_capacity(EVENTS),
+            robots: Vec::new(),
+            ready: Vec::new(),
+            buffer: vec![0; READ_BYTES].into(),
+        })
+    }
+
+    /// Starts to connect to a robot at `HOST:PORT` and gives its number, 0 for the first; does not wait for it, but for the
+    /// name of its host. One that does not answer has a number as well, and [`Robot::end`] says why once the system gives up.
+    pub fn connect(&mut self, name: &str, address: &str) -> usize {
+        let number = self.robots.len();
+        let line = match self.open(address, number) {
+            Ok(stream) => Line::Opening(stream),
+            Err(error) => Line::Ended(End::Failed(error.kind())),
+        };
+        self.robots.push(Robot {
+            name: name.into(),
+            line,
+            is_ready: false,
+            is_ending: false,
+            listener: Listener::new(),
+            bytes: 0,
+            places: 0,
+        });
+        number
+    }
+
+    fn open(&self, address: &str, number: usize) -> io::Result<TcpStream> {
+        let address = address.to_socket_addrs()?.next().ok_or(ErrorKind::NotFound)?;
+        let mut stream = TcpStream::connect(address)?;
+        cost::bound_receiving(&stream)?;
+        // It becomes writable when it is connected.
+        self.poll.registry().register(&mut stream, Token(number), Interest::READABLE | Interest::WRITABLE)?;
+        Ok(stream)
+    }
+
+    /// Waits until a robot says something, `timeout` at most, and hears every robot that has something to say, a piece of it
+    /// each: a robot that never stops does not keep the others waiting. `heard` gets the robot's number, its
+    /// listener, and what it heard.
+    ///
+    /// # Errors
+    /// When the system fails; what a robot's line does is no error.
+    pub fn listen(&mut self, timeout: Duration, mut heard: impl FnMut(usize, &Listener, Event<'_>)) -> io::Result<()> {
+        let timeout = if self.ready.is_empty() { timeout } else { Duration::ZERO };
+        match self.poll.poll(&mut self.events, Some(timeout)) {
+            Err(error) if error.kind() == ErrorKind::Interrupted => return Ok(()),
+            result => result?,
+        }
+        for event in &self.events {
+            let Token(number) = event.token();
+            if !std::mem::replace(&mut self.robots[number].is_ready, true) {
+                self.ready.push(number);
+            }
+            // The end of the line makes no event of its own when it comes together with the last bytes.
+            self.robots[number].is_ending |= event.is_read_closed();
+        }
+        let (robots, buffer) = (&mut self.robots, &mut self.buffer);
+        self.ready.retain(|&number| {
+            let robot = &mut robots[number];
+            robot.is_ready = robot.read(buffer, |listener, event| heard(number, listener, event));
+            robot.is_ready
+        });
+        Ok(())
+    }
+
+    /// The robots by their numbers.
+    pub fn robots(&self) -> &[Robot] {
+        &self.robots
+    }
+
+    /// All robots in numbers. Cost: [`toposlam::wire::Picture::is_converged`] for each.
+    pub fn totals(&self) -> Totals {
+        let mut totals = Totals::default();
+        for robot in &self.robots {
+            match robot.line {
+                Line::Opening(_) => totals.connecting += 1,
+                Line::Open(_) => totals.connected += 1,
+                Line::Ended(End::Closed) => totals.closed += 1,
+                Line::Ended(End::Failed(_)) => totals.failed += 1,
+            }
+            let counters = robot.listener.counters();
+            totals.converged += usize::from(robot.is_converged());
+            totals.messages += u64::from(counters.messages);
+            totals.bytes += robot.bytes;
+            totals.places += robot.places;
+            totals.lost += u64::from(counters.lost);
+            totals.damaged +=
+                [counters.corrupt, counters.cut, counters.too_long, counters.unknown_version, counters.unknown_message]
+                    .map(u64::from)
+                    .iter()
+                    .sum::<u64>();
+        }
+        totals
+    }
+}
+
+impl Line {
+    /// Looks what became of the connection.
+    fn settle(&mut self) {
+        let Self::Opening(stream) = self else { return };
+        let result = stream.take_error().and_then(|error| error.map_or(Ok(()), Err)).and_then(|()| stream.peer_addr());
+        *self = match (result, std::mem::replace(self, Self::Ended(End::Closed))) {
+            (Ok(_), Self::Opening(stream)) => Self::Open(stream),
+            (Err(error), Self::Opening(stream)) if error.kind() == ErrorKind::NotConnected => Self::Opening(stream),
+            (Err(error), _) => Self::Ended(End::Failed(error.kind())),
+            (Ok(_), other) => other,
+        };
+    }
+}
+
+impl Robot {
+    /// The name that it was given.
+    pub fn name(&self) -> &str {
+        &self.name
+    }
+
+    /// All that is known of it.
+    pub const fn listener(&self) -> &Listener {
+        &self.listener
+    }
+
+    /// Why it is not heard any more; `None` while it is.
+    pub const fn end(&self) -> Option<End> {
+        match self.line {
+            Line::Opening(_) | Line::Open(_) => None,
+            Line::Ended(end) => Some(end),
+        }
+    }
+
+    /// Whether its map is known to be heard whole. A robot of which nothing was heard has no map to be whole.
+    pub fn is_converged(&self) -> bool {
+        self.listener.picture().is_converged()
+    }
+
+    /// How many bytes it sent.
+    pub const fn bytes(&self) -> u64 {
+        self.bytes
+    }
+
+    /// How many places it found while it was heard.
+    pub const fn places(&self) -> u64 {
+        self.places
+    }
+
+    /// Reads a piece; whether there may be more.
+    fn read(&mut self, buffer: &mut [u8], mut heard: impl FnMut(&Listener, Event<'_>)) -> bool {
+        self.line.settle();
+        let Line::Open(stream) = &mut self.line else { return false };
+        let end = match stream.read(buffer) {
+            Ok(0) => End::Closed,
+            Ok(count) => {
+                self.bytes += count as u64;
+                let places = &mut self.places;
+                self.listener.feed(&buffer[..count], |listener, event| {
+                    if let Event::Message(_, Message::Place { .. }) = event {
+                        *places += 1;
+                    }
+                    heard(listener, event);
+                });
+                return count == buffer.len() || self.is_ending || !SHORT_READ_EMPTIES;
+            }
+            Err(error) => match error.kind() {
+                ErrorKind::WouldBlock => return false,
+                ErrorKind::Interrupted => return true,
+                kind => End::Failed(kind),
+            },
+        };
+        // Closing the line takes it out of the poll.
+        self.line = Line::Ended(end);
+        false
+    }
+}
+
+#[cfg(test)]
+mod tests;

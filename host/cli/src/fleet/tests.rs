@@ -1,0 +1,85 @@
+use super::crowd::{Afterwards, Crowd, Life, Pace};
+use super::*;
+use std::io::Write;
+use std::net::TcpListener;
+use toposlam_sim::world::Plan;
+
+const PATIENCE: Duration = Duration::from_millis(5);
+const FRAME: Duration = Duration::from_millis(100);
+const LIFE_FRAMES: usize = 1500;
+
+fn lives() -> Vec<Life> {
+    [("office", 1), ("ring", 2)]
+        .map(|(plan, seed)| Life::record(&Plan::built_in(plan).unwrap(), seed, LIFE_FRAMES).unwrap())
+        .into()
+}
+
+#[test]
+fn a_robot_that_dies_and_one_that_talks_nonsense_do_not_disturb_the_others() {
+    const ROBOTS: usize = 20;
+    let lives = lives();
+    let maps: Vec<_> = lives.iter().map(|life| life.map().clone()).collect();
+    assert!(maps.iter().all(|map| map.vertices.len() > 2));
+    let mut crowd = Crowd::bind("127.0.0.1:0", lives, ROBOTS, Afterwards::Silence).unwrap();
+    let others = TcpListener::bind("127.0.0.1:0").unwrap();
+    let (crowd_address, other_address) =
+        (crowd.address().unwrap().to_string(), others.local_addr().unwrap().to_string());
+
+    let mut fleet = Fleet::new().unwrap();
+    for number in 0..ROBOTS {
+        fleet.connect(&format!("robot {number}"), &crowd_address);
+    }
+    let dying = fleet.connect("dying", &other_address);
+    let (mut dying_end, _) = others.accept().unwrap();
+    let nonsense = fleet.connect("nonsense", &other_address);
+    let (mut nonsense_end, _) = others.accept().unwrap();
+    nonsense_end.set_nonblocking(true).unwrap();
+    drop(others);
+    let absent = fleet.connect("absent", &other_address);
+
+    dying_end.write_all(&[7, 1, 2]).unwrap();
+    drop(dying_end);
+    let garbage: Vec<u8> = (0..4096_u32).map(|byte| (byte * 37 % 11) as u8).collect();
+    let (mut said, mut messages) = (0, 0);
+    loop {
+        let piece = crowd.live(Duration::ZERO, Pace::Unbounded);
+        said += piece as u64;
+        // What does not fit, because the fleet is behind, is not said.
+        let _ = nonsense_end.write(&garbage);
+        fleet.listen(PATIENCE, |_, _, event| messages += u64::from(matches!(event, Event::Message(..)))).unwrap();
+        let heard: u64 = fleet.robots()[..ROBOTS].iter().map(Robot::bytes).sum();
+        if crowd.met() == ROBOTS && piece == 0 && heard == said && fleet.totals().connecting == 0 {
+            break;
+        }
+    }
+
+    for (number, robot) in fleet.robots().iter().enumerate().take(ROBOTS) {
+        assert_eq!((robot.name(), robot.end()), (format!("robot {number}").as_str(), None));
+        assert!(robot.is_converged(), "{number}");
+        assert_eq!(robot.listener().map(), maps[number % maps.len()], "{number}");
+        assert_eq!(robot.listener().counters().lost, 0, "{number}");
+        assert!(robot.places() > 0, "{number}");
+    }
+    assert_eq!(fleet.robots()[dying].end(), Some(End::Closed));
+    assert_eq!(fleet.robots()[absent].end(), Some(End::Failed(ErrorKind::ConnectionRefused)));
+    assert_eq!(fleet.robots()[nonsense].end(), None);
+    let totals = fleet.totals();
+    assert_eq!((totals.connected, totals.closed, totals.failed), (ROBOTS + 1, 1, 1));
+    assert_eq!((totals.converged, totals.lost), (ROBOTS, 0));
+    assert!(totals.damaged > 100, "{}", totals.damaged);
+    assert_eq!(totals.messages, messages);
+}
+
+#[test]
+fn a_robot_that_starts_anew_is_no_robot_that_loses_frames() {
+    let life = Life::record(&Plan::built_in("flat").unwrap(), 1, 300).unwrap();
+    let twice = 2 * life.bytes() as u64;
+    let mut crowd = Crowd::bind("127.0.0.1:0", vec![life], 1, Afterwards::Again).unwrap();
+    let mut fleet = Fleet::new().unwrap();
+    fleet.connect("restless", &crowd.address().unwrap().to_string());
+    while fleet.totals().bytes <= twice {
+        crowd.live(FRAME, Pace::Times(10.0));
+        fleet.listen(PATIENCE, |_, _, _| ()).unwrap();
+    }
+    assert_eq!((fleet.totals().lost, fleet.totals().damaged), (0, 0));
+}

@@ -1,0 +1,102 @@
+//! The monitor without a screen: a line of text for each event, for scripts and logs.
+
+use std::io::{self, Write};
+use std::sync::mpsc::{RecvTimeoutError, sync_channel};
+use std::time::{Duration, Instant};
+
+use anyhow::{Context, ensure};
+use serde_json::{Value, json};
+
+use toposlam_link::link::{Link, News, Options, Source};
+use toposlam_link::{json, wording};
+
+/// News that wait to be written; a link that has more to say waits.
+const QUEUE: usize = 1024;
+
+/// How events are written.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Form {
+    /// In plain words.
+    Words,
+    /// As one JSON object each.
+    Json,
+}
+
+/// When to stop.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Limits {
+    /// After so many messages and damages.
+    pub events: Option<u64>,
+    /// After this time.
+    pub time: Option<Duration>,
+}
+
+/// Writes what is heard until a limit is reached, the standard input ends, or nobody reads what is written.
+///
+/// `name` is the name of the line, `-` for the standard input. A line that is cut is opened again.
+///
+/// # Errors
+/// When the time is over before so many events came, or before any came, and when nothing can be written.
+pub fn run(
+    name: &str,
+    baud: u32,
+    options: Options,
+    form: Form,
+    limits: Limits,
+    mut out: impl Write,
+) -> anyhow::Result<()> {
+    let (sender, inbox) = sync_channel(QUEUE);
+    let _link = Link::start(Source::named(name, baud), options, move |news| sender.send(news).is_ok());
+    let deadline = limits.time.and_then(|time| Instant::now().checked_add(time));
+    let mut events = 0;
+    while limits.events.is_none_or(|most| events < most) {
+        let patience = deadline.map_or(Duration::MAX, |deadline| deadline.saturating_duration_since(Instant::now()));
+        let news = match inbox.recv_timeout(patience) {
+            Ok(news) => news,
+            Err(RecvTimeoutError::Timeout) => break,
+            Err(RecvTimeoutError::Disconnected) => break,
+        };
+        events += u64::from(matches!(news, News::Heard(..)));
+        let is_over = matches!(news, News::Ended);
+        if let Err(error) = write_line(&news, name, form, &mut out) {
+            // Whoever read this has seen enough.
+            return if error.kind() == io::ErrorKind::BrokenPipe { Ok(()) } else { Err(error).context("writing") };
+        }
+        if is_over {
+            return Ok(());
+        }
+    }
+    let wanted = limits.events.unwrap_or(1);
+    ensure!(events >= wanted, "{events} of {wanted} events came in time");
+    Ok(())
+}
+
+fn write_line(news: &News, name: &str, form: Form, out: &mut impl Write) -> io::Result<()> {
+    match form {
+        Form::Words => writeln!(out, "{}", in_words(news, name))?,
+        Form::Json => writeln!(out, "{}", as_json(news, name))?,
+    }
+    out.flush()
+}
+
+fn in_words(news: &News, name: &str) -> String {
+    match news {
+        News::Connected => format!("connected to {name}"),
+        News::Disconnected(reason) => format!("no line to {name}: {reason}; trying again"),
+        News::Ended => "the input has ended".to_owned(),
+        News::Heard(event, _) => wording::event(event.into()),
+        News::Answered(task, answer) => format!("{task}: {answer:?}"),
+    }
+}
+
+fn as_json(news: &News, name: &str) -> Value {
+    match news {
+        News::Connected => json!({"event": "Connected", "line": name}),
+        News::Disconnected(reason) => json!({"event": "Disconnected", "line": name, "reason": reason}),
+        News::Ended => json!({"event": "Ended", "line": name}),
+        News::Heard(event, _) => json::event(event.into()),
+        News::Answered(task, answer) => {
+            json!({"event": "Answered", "task": task.to_string(), "answer": format!("{answer:?}")})
+        }
+    }
+}

@@ -1,0 +1,41 @@
+//! A live view of a robot in a terminal: its map, where it is and why it believes so, with a key for every command.
+//!
+//! | Part | Is |
+//! |---|---|
+//! | [`model`] | all that is shown; it takes in news of a [`link`](toposlam_link::link) and keys, and says what to do |
+//! | [`view`] | the model on a ratatui frame; it changes nothing |
+//! | [`headless`] | a line of text for each event instead |
+//! | [`screen`] | the real terminal, and the loop between link, keys and frame |
+//!
+//! The model and the view need no terminal:
+//!
+//! ```
+//! use std::time::Instant;
+//!
+//! use ratatui::{Terminal, backend::TestBackend};
+//! use toposlam::wire::{Encoder, MAX_FRAME_BYTES, Message};
+//! use toposlam_link::{link::News, listener::Listener};
+//! use toposlam_cli::monitor::{model::Model, view};
+//!
+//! let mut model = Model::new("tcp:robot:7070");
+//! let (mut listener, mut frame) = (Listener::new(), [0; MAX_FRAME_BYTES]);
+//! let edge = Message::Edge { a: 0, b: 1, present: true };
+//! listener.feed(Encoder::new(0).encode(&edge, &mut frame)?, |listener, event| {
+//!     model.hear(News::heard(listener, event), Instant::now());
+//! });
+//! model.settle(Instant::now());
+//!
+//! let mut terminal = Terminal::new(TestBackend::new(80, 24))?;
+//! terminal.draw(|frame| view::draw(frame, &model))?;
+//! assert!(terminal.backend().to_string().contains("2 vertices, 1 edge"));
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+
+pub mod headless;
+pub mod model;
+mod prompt;
+pub mod screen;
+pub mod view;
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,310 @@
+//! What the monitor shows: it takes in news of the link and keys, and says what to do.
+//!
+//! Nothing here knows of a terminal or a line; the time comes from outside.
+
+use std::collections::VecDeque;
+use std::time::{Duration, Instant};
+
+use ratatui::crossterm::event::{KeyCode, KeyEvent, KeyEventKind, KeyModifiers};
+use toposlam::FaultKind;
+use toposlam::wire::{Arrival, Command, Header, Info, Message, Outcome};
+
+use super::prompt::{Prompt, Question};
+use toposlam_link::link::{Answer, News, Task, TaskError};
+use toposlam_link::watch::Watch;
+use toposlam_link::wording;
+
+const LOG_LINES: usize = 200;
+
+/// The state of the monitor.
+#[derive(Clone, Debug)]
+pub struct Model {
+    watch: Watch,
+    heard_at: Option<Instant>,
+    quiet: Option<Duration>,
+    told: Told,
+    waiting: VecDeque<String>,
+    log: VecDeque<Entry>,
+    prompt: Option<Prompt>,
+    helps: bool,
+    pane: Pane,
+    /// The first vertex of the table.
+    scroll: usize,
+}
+
+/// What to do after a key.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Action {
+    /// Have the link do something.
+    Start(Task),
+    /// End the monitor.
+    Quit,
+}
+
+/// What is shown in the place of the map, where there is no room for all.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Pane {
+    Map,
+    Vertices,
+    Ring,
+    Robot,
+}
+
+impl Pane {
+    pub(super) const ALL: [Self; 4] = [Self::Map, Self::Vertices, Self::Ring, Self::Robot];
+
+    const fn next(self, steps: usize) -> Self {
+        Self::ALL[(self as usize + steps) % Self::ALL.len()]
+    }
+}
+
+/// A line of the log.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(super) struct Entry {
+    pub(super) is_bad: bool,
+    pub(super) text: String,
+}
+
+/// What the robot does, as far as it was told and has answered.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Told {
+    pub(super) paused: Option<bool>,
+    pub(super) localise_only: Option<bool>,
+    pub(super) info: Option<Info>,
+}
+
+impl Model {
+    /// A monitor of a line of that name that has heard nothing; `-` is the standard input, on which nothing can be told.
+    pub fn new(line: &str) -> Self {
+        Self {
+            watch: Watch::new(line),
+            heard_at: None,
+            quiet: None,
+            told: Told::default(),
+            waiting: VecDeque::new(),
+            log: VecDeque::new(),
+            prompt: None,
+            helps: false,
+            pane: Pane::Map,
+            scroll: 0,
+        }
+    }
+
+    /// Takes in what happened on the link.
+    pub fn hear(&mut self, news: News, now: Instant) {
+        match &news {
+            News::Connected => {
+                self.heard_at = Some(now);
+                self.note("connected");
+            }
+            News::Disconnected(reason) => self.complain(format!("no line: {reason}; trying again")),
+            News::Ended => self.note("the input has ended"),
+            News::Heard(event, _) => {
+                self.heard_at = Some(now);
+                if let Ok((header, message)) = event {
+                    self.take_in(*header, message);
+                }
+            }
+            News::Answered(task, answer) => {
+                self.waiting.pop_front();
+                self.answered(task, answer);
+            }
+        }
+        self.watch.hear(news);
+    }
+
+    fn take_in(&mut self, header: Header, message: &Message) {
+        match header.arrival {
+            Arrival::Late => return,
+            Arrival::Restart => {
+                self.told = Told::default();
+                self.complain("the robot has started anew".to_owned());
+            }
+            Arrival::First | Arrival::InOrder | Arrival::AfterGap { .. } => {}
+        }
+        match message {
+            Message::Renamed(_) | Message::Journey(_) => self.note(wording::message(message)),
+            Message::Fault { kind, count } if self.is_news(*kind, *count) => self.complain(wording::message(message)),
+            _ => {}
+        }
+    }
+
+    fn is_news(&self, kind: u8, count: u32) -> bool {
+        FaultKind::ALL.get(usize::from(kind)).is_none_or(|&kind| self.watch.listener().picture().fault(kind) != count)
+    }
+
+    fn answered(&mut self, task: &Task, answer: &Result<Answer, TaskError>) {
+        match answer {
+            Ok(Answer::Outcome(Outcome::Refused(refusal))) => self.complain(format!("{task}: refused: {refusal}")),
+            Ok(Answer::Outcome(outcome)) => {
+                self.note(format!("{task}: {}", wording::outcome(outcome)));
+                match (task, outcome) {
+                    (_, Outcome::Info(info)) => {
+                        let (paused, localise_only) = (Some(info.paused), Some(info.localise_only));
+                        self.told = Told { paused, localise_only, info: Some(*info) };
+                    }
+                    (Task::Tell(Command::Pause { on }), _) => self.told.paused = Some(*on),
+                    (Task::Tell(Command::LocaliseOnly { on }), _) => self.told.localise_only = Some(*on),
+                    _ => {}
+                }
+            }
+            Ok(Answer::Written(bytes)) => self.note(format!("{task}: {bytes} bytes written")),
+            Ok(Answer::Restored(bytes)) => self.note(format!("{task}: {bytes} bytes restored")),
+            Err(error) => self.complain(format!("{task}: {error}")),
+        }
+    }
+
+    /// Takes in a key; says what is to be done then, if anything.
+    pub fn press(&mut self, key: KeyEvent) -> Option<Action> {
+        if key.kind == KeyEventKind::Release {
+            return None;
+        }
+        if key.modifiers.contains(KeyModifiers::CONTROL) {
+            return (key.code == KeyCode::Char('c')).then_some(Action::Quit);
+        }
+        if self.prompt.is_some() {
+            return self.type_into_prompt(key.code);
+        }
+        if self.helps {
+            self.helps = false;
+            return (key.code == KeyCode::Char('q')).then_some(Action::Quit);
+        }
+        match key.code {
+            KeyCode::Char('q') => Some(Action::Quit),
+            KeyCode::Char('?') => {
+                self.helps = true;
+                None
+            }
+            KeyCode::Tab => {
+                self.pane = self.pane.next(1);
+                None
+            }
+            KeyCode::BackTab => {
+                self.pane = self.pane.next(Pane::ALL.len() - 1);
+                None
+            }
+            KeyCode::Up => {
+                self.scroll = self.scroll.saturating_sub(1);
+                None
+            }
+            KeyCode::Down => {
+                self.scroll = (self.scroll + 1).min(self.watch.map().vertices.len().saturating_sub(1));
+                None
+            }
+            KeyCode::Char(character) => self.begin(character),
+            _ => None,
+        }
+    }
+
+    /// The keys that tell the robot something.
+    fn begin(&mut self, key: char) -> Option<Action> {
+        let wanted = match key {
+            'i' => Ok(Command::Info),
+            'u' => Ok(Command::GetMap),
+            'e' => Ok(Command::Explore),
+            'p' => Ok(Command::Pause { on: true }),
+            'c' => Ok(Command::Pause { on: false }),
+            'l' => Ok(Command::LocaliseOnly { on: true }),
+            'm' => Ok(Command::LocaliseOnly { on: false }),
+            'g' => Err(Question::GoTo),
+            's' => Err(Question::Snapshot),
+            'r' => Err(Question::Restore),
+            't' => Err(Question::Setting),
+            'x' => Err(Question::Reset),
+            _ => return None,
+        };
+        if self.is_read_only() {
+            self.complain("nothing can be told on the standard input".to_owned());
+            return None;
+        }
+        match wanted {
+            Ok(command) => Some(self.start(Task::Tell(command))),
+            Err(question) => {
+                self.prompt = Some(Prompt::new(question));
+                None
+            }
+        }
+    }
+
+    fn type_into_prompt(&mut self, key: KeyCode) -> Option<Action> {
+        match key {
+            KeyCode::Char(character) => self.prompt.as_mut()?.push(character),
+            KeyCode::Backspace => self.prompt.as_mut()?.pop(),
+            KeyCode::Esc => self.prompt = None,
+            KeyCode::Enter => match self.prompt.take()?.answer() {
+                Ok(task) => return Some(self.start(task)),
+                Err(why) => self.complain(why),
+            },
+            _ => {}
+        }
+        None
+    }
+
+    fn start(&mut self, task: Task) -> Action {
+        self.waiting.push_back(task.to_string());
+        Action::Start(task)
+    }
+
+    /// To be called before drawing: arranges the map if it has changed, and tells how long nothing was heard.
+    pub fn settle(&mut self, now: Instant) {
+        self.watch.arrange();
+        self.quiet = self.heard_at.map(|heard_at| now.saturating_duration_since(heard_at));
+    }
+
+    /// What is known of the robot.
+    pub const fn watch(&self) -> &Watch {
+        &self.watch
+    }
+
+    /// Whether nothing can be told.
+    pub fn is_read_only(&self) -> bool {
+        self.watch.line() == "-"
+    }
+
+    pub(super) const fn quiet(&self) -> Option<Duration> {
+        self.quiet
+    }
+
+    pub(super) const fn told(&self) -> Told {
+        self.told
+    }
+
+    pub(super) fn waiting(&self) -> Option<&str> {
+        self.waiting.front().map(String::as_str)
+    }
+
+    pub(super) const fn log(&self) -> &VecDeque<Entry> {
+        &self.log
+    }
+
+    pub(super) const fn prompt(&self) -> Option<&Prompt> {
+        self.prompt.as_ref()
+    }
+
+    pub(super) const fn helps(&self) -> bool {
+        self.helps
+    }
+
+    pub(super) const fn scroll(&self) -> usize {
+        self.scroll
+    }
+
+    pub(super) const fn pane(&self) -> Pane {
+        self.pane
+    }
+
+    fn note(&mut self, text: impl Into<String>) {
+        self.push(Entry { is_bad: false, text: text.into() });
+    }
+
+    fn complain(&mut self, text: String) {
+        self.push(Entry { is_bad: true, text });
+    }
+
+    fn push(&mut self, entry: Entry) {
+        if self.log.len() == LOG_LINES {
+            self.log.pop_front();
+        }
+        self.log.push_back(entry);
+    }
+}

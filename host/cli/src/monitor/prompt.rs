@@ -1,0 +1,105 @@
+//! What the monitor asks before it can tell the robot something: a vertex, a file, a setting, or whether it is meant.
+
+use std::path::PathBuf;
+
+use toposlam::wire::Command;
+
+use toposlam_link::link::Task;
+use toposlam_link::setting;
+
+/// A question and what was typed so far.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(super) struct Prompt {
+    question: Question,
+    text: String,
+}
+
+/// What is asked.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Question {
+    GoTo,
+    Snapshot,
+    Restore,
+    Setting,
+    Reset,
+}
+
+impl Prompt {
+    pub(super) const fn new(question: Question) -> Self {
+        Self { question, text: String::new() }
+    }
+
+    pub(super) fn push(&mut self, character: char) {
+        self.text.push(character);
+    }
+
+    pub(super) fn pop(&mut self) {
+        self.text.pop();
+    }
+
+    /// The question, as it is shown.
+    pub(super) fn question(&self) -> String {
+        match self.question {
+            Question::GoTo => "go to which vertex? ".to_owned(),
+            Question::Snapshot => "snapshot to which file? ".to_owned(),
+            Question::Restore => "restore from which file? ".to_owned(),
+            Question::Setting => format!("set NAME VALUE ({}): ", setting::NAMES.join(", ")),
+            Question::Reset => "forget the whole map? type yes: ".to_owned(),
+        }
+    }
+
+    pub(super) fn text(&self) -> &str {
+        &self.text
+    }
+
+    /// What is to be done, or why what was typed is no answer.
+    pub(super) fn answer(&self) -> Result<Task, String> {
+        let text = self.text.trim();
+        if text.is_empty() {
+            return Err("nothing was typed".to_owned());
+        }
+        match self.question {
+            Question::GoTo => {
+                let vertex = text.parse().map_err(|_| format!("`{text}` is no number of a vertex"))?;
+                Ok(Task::Tell(Command::GoTo { vertex }))
+            }
+            Question::Snapshot => Ok(Task::Snapshot(PathBuf::from(text))),
+            Question::Restore => Ok(Task::Restore(PathBuf::from(text))),
+            Question::Setting => {
+                let (name, value) = text.split_once(' ').ok_or("a setting needs a name and a value")?;
+                let value = value.trim().parse().map_err(|_| format!("`{value}` is no number from 0 to 65535"))?;
+                let setting = setting::named(name, value).ok_or_else(|| format!("there is no setting `{name}`"))?;
+                Ok(Task::Tell(Command::SetConfig(setting)))
+            }
+            Question::Reset if text == "yes" => Ok(Task::Tell(Command::Reset)),
+            Question::Reset => Err("not reset".to_owned()),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use toposlam::wire::Setting;
+
+    fn answer(question: Question, text: &str) -> Result<Task, String> {
+        let mut prompt = Prompt::new(question);
+        text.chars().for_each(|character| prompt.push(character));
+        prompt.answer()
+    }
+
+    #[test]
+    fn what_is_typed_becomes_a_task_or_is_said_to_be_none() {
+        assert_eq!(answer(Question::GoTo, "3"), Ok(Task::Tell(Command::GoTo { vertex: 3 })));
+        assert!(answer(Question::GoTo, "256").unwrap_err().contains("256"));
+        assert_eq!(answer(Question::Snapshot, " a b "), Ok(Task::Snapshot("a b".into())));
+        assert!(answer(Question::Restore, " ").is_err());
+        let set = Task::Tell(Command::SetConfig(Setting::NoiseMm(40)));
+        assert_eq!(answer(Question::Setting, "noise-mm  40"), Ok(set));
+        for wrong in ["noise-mm", "noise-mm 70000", "colour 3"] {
+            assert!(answer(Question::Setting, wrong).is_err(), "{wrong}");
+        }
+        assert_eq!(answer(Question::Reset, "yes"), Ok(Task::Tell(Command::Reset)));
+        assert!(answer(Question::Reset, "y").is_err());
+    }
+}

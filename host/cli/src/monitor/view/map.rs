@@ -1,0 +1,132 @@
+//! The map as a picture.
+
+use ratatui::Frame;
+use ratatui::layout::Rect;
+use ratatui::style::{Color, Style};
+use ratatui::symbols::Marker;
+use ratatui::text::{Line as TextLine, Span};
+use ratatui::widgets::Block;
+use ratatui::widgets::canvas::{Canvas, Circle, Context, Line};
+
+use super::vertices::permille_at;
+use super::{FAINT, HERE};
+use crate::monitor::model::Model;
+use toposlam_link::layout::Point;
+
+/// What is free around the vertices, where an edge is about 1 long.
+const MARGIN: f64 = 0.5;
+/// The circle of the widest place, and what any circle has at least.
+const WIDEST: f64 = 0.22;
+const LEAST: f64 = 0.08;
+
+pub(super) fn draw(frame: &mut Frame<'_>, area: Rect, model: &Model) {
+    let block = Block::bordered().title("map: number, radius in mm; @ and yellow: the robot");
+    let inside = block.inner(area);
+    let (x_bounds, y_bounds) = bounds(model.watch().points(), inside);
+    let canvas = Canvas::default()
+        .block(block)
+        .marker(Marker::Braille)
+        .x_bounds(x_bounds)
+        .y_bounds(y_bounds)
+        .paint(|context| paint(context, model));
+    frame.render_widget(canvas, area);
+}
+
+fn paint(context: &mut Context<'_>, model: &Model) {
+    let points = model.watch().points();
+    let map = model.watch().map();
+    for &(a, b) in &map.edges {
+        let (Some(from), Some(to)) = (points.get(usize::from(a)), points.get(usize::from(b))) else { continue };
+        let color = if is_worst(model, a, b) { Color::LightRed } else { Color::Gray };
+        if a == b {
+            context.draw(&Circle { x: from.x, y: from.y + 0.3, radius: 0.3, color });
+        } else {
+            context.draw(&Line::new(from.x, from.y, to.x, to.y, color));
+        }
+    }
+    context.layer();
+    let widest_mm = map.vertices.iter().map(|vertex| vertex.radius_mm).max().unwrap_or(0).max(1);
+    for (number, (vertex, point)) in map.vertices.iter().zip(points).enumerate() {
+        let radius = LEAST + (WIDEST - LEAST) * f64::from(vertex.radius_mm) / f64::from(widest_mm);
+        context.draw(&Circle { x: point.x, y: point.y, radius, color: color_of(model, number) });
+    }
+    context.layer();
+    for (number, (vertex, point)) in map.vertices.iter().zip(points).enumerate() {
+        context.print(point.x, point.y, label(model, number, vertex.radius_mm));
+    }
+}
+
+fn label(model: &Model, number: usize, radius_mm: u16) -> TextLine<'static> {
+    let color = color_of(model, number);
+    let is_here = is_here(model, number);
+    let name = format!("{}{number}", if is_here { "@" } else { "" });
+    let permille = permille_at(model, number).map_or(String::new(), |permille| format!(" {permille}‰"));
+    let style = if is_here { HERE } else { Style::new().fg(color) };
+    TextLine::from(vec![
+        Span::styled(name, style),
+        Span::styled(format!(" {radius_mm}"), FAINT),
+        Span::styled(permille, Style::new().fg(color)),
+    ])
+}
+
+fn color_of(model: &Model, number: usize) -> Color {
+    let target = model.watch().listener().picture().journey().map(|journey| usize::from(journey.vertex));
+    if is_here(model, number) {
+        Color::Yellow
+    } else if permille_at(model, number).is_some() {
+        Color::Cyan
+    } else if target == Some(number) {
+        Color::Magenta
+    } else {
+        Color::White
+    }
+}
+
+fn is_here(model: &Model, number: usize) -> bool {
+    model.watch().listener().picture().location().is_some_and(|location| usize::from(location.vertex) == number)
+}
+
+/// Whether the walk that explains the worst n-gram goes along this edge.
+fn is_worst(model: &Model, a: u8, b: u8) -> bool {
+    let Some(worst) = model.watch().listener().picture().worst() else { return false };
+    worst.vertices.as_slice().windows(2).any(|step| *step == [a, b] || *step == [b, a])
+}
+
+/// What part of the plane is seen, so that all points are in it and a circle is round: a cell is twice as high as wide.
+fn bounds(points: &[Point], area: Rect) -> ([f64; 2], [f64; 2]) {
+    let (width, height) = (f64::from(area.width.max(1)), 2.0 * f64::from(area.height.max(1)));
+    let range = |of: fn(&Point) -> f64| {
+        let least = points.iter().map(of).fold(f64::INFINITY, f64::min);
+        let most = points.iter().map(of).fold(f64::NEG_INFINITY, f64::max);
+        if least <= most { (f64::midpoint(least, most), most - least) } else { (0.0, 0.0) }
+    };
+    let ((x, wide), (y, high)) = (range(|point| point.x), range(|point| point.y));
+    // The labels stand to the right of their vertices.
+    let per_cell = ((wide + 2.0 * MARGIN) / (width - 10.0).max(1.0)).max((high + 2.0 * MARGIN) / height);
+    let centre = x + 4.0 * per_cell;
+    (
+        [centre - per_cell * width / 2.0, centre + per_cell * width / 2.0],
+        [y - per_cell * height / 2.0, y + per_cell * height / 2.0],
+    )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn all_points_are_seen_and_circles_are_round() {
+        let points = [Point { x: -3.0, y: 1.0 }, Point { x: 2.0, y: 9.0 }];
+        for (width, height) in [(46, 15), (100, 10), (20, 60), (1, 1), (0, 0)] {
+            let ([left, right], [bottom, top]) = bounds(&points, Rect::new(0, 0, width, height));
+            for point in points {
+                assert!((left..right).contains(&point.x) || width < 12, "{width} × {height}");
+                assert!((bottom..top).contains(&point.y), "{width} × {height}");
+            }
+            let (across, up) = ((right - left) / f64::from(width.max(1)), (top - bottom) / f64::from(height.max(1)));
+            assert!((up / across - 2.0).abs() < 1e-9, "{width} × {height}");
+        }
+        let ([left, right], _) = bounds(&[], Rect::new(0, 0, 40, 20));
+        assert!(left < 0.0 && right > 0.0);
+    }
+}

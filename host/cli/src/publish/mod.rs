@@ -1,0 +1,306 @@
+//! What a robot says, told to an MQTT broker (feature `mqtt`), so that any number can listen and none of them to the robot.
+//!
+//! | Topic | Holds | Retained | QoS |
+//! |---|---|---|---|
+//! | `toposlam/NAME/status` | `online` or `offline`: whether the robot can be heard here; the last will is `offline` | yes | 1 |
+//! | `toposlam/NAME/map` | the whole map as [`map_json`], when it changed and is known to be the robot's | yes | 1 |
+//! | `toposlam/NAME/events` | each message and damage as [`json::event`] | no | 0 |
+//! | `toposlam/NAME/frames` | each message as the frame it came in, when [`Options::frames`] wants them | no | 0 |
+//!
+//! The robot is heard whatever the broker does: what does not fit into a bounded queue, and what is said while the broker is
+//! away, is dropped and counted. Status and map are told again when the broker is back.
+//!
+//! ```
+//! use toposlam_cli::publish::{Broker, Options, Publisher};
+//!
+//! let broker: Broker = "mqtt://127.0.0.1:1".parse()?;
+//! // Nobody is there, which a publisher does not mind.
+//! let publisher = Publisher::start(Options::new(broker, "kitchen")?, |_| ());
+//! assert_eq!(publisher.counters().published, 0);
+//! assert!("http://127.0.0.1".parse::<Broker>().is_err());
+//! # Ok::<(), toposlam_cli::publish::OptionError>(())
+//! ```
+
+mod broker;
+
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::sync::mpsc::{Receiver, channel};
+use std::sync::{Arc, Mutex, PoisonError};
+use std::thread;
+use std::time::Duration;
+
+use rumqttc::{Client, ConnectionError, LastWill, MqttOptions, Packet, QoS};
+use serde_json::{Value, json};
+use toposlam::wire::{Encoder, MAX_FRAME_BYTES, Message};
+
+pub use broker::{Broker, OptionError, Options};
+
+use toposlam_link::json;
+use toposlam_link::link::News;
+use toposlam_link::listener::{Event, Listener};
+
+/// How much may wait for the broker.
+const QUEUE_MESSAGES: usize = 256;
+/// The broker is asked for a sign of life so often.
+const KEEP_ALIVE: Duration = Duration::from_secs(5);
+/// How long to wait before a broker that is away is tried again.
+const RETRY: Duration = Duration::from_millis(500);
+/// How long the last words may take.
+const FAREWELL: Duration = Duration::from_secs(1);
+/// More than the largest map takes as JSON.
+const MOST_BYTES: usize = 1 << 17;
+
+/// What happens between here and the broker.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum BrokerNews {
+    /// The broker is there.
+    Connected,
+    /// The broker is away, or cannot be reached. It is tried again until it can, and this is not repeated for the same
+    /// reason.
+    Disconnected(String),
+}
+
+/// How much was told.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Counters {
+    /// What was given to the broker's connection, maps and statuses included.
+    pub published: u64,
+    /// Events and frames that the broker did not get, because it was away or too slow.
+    pub dropped: u64,
+}
+
+/// Tells a broker what a robot says. When it is dropped the robot's status becomes `offline`.
+pub struct Publisher {
+    client: Client,
+    shared: Arc<Shared>,
+    frames: bool,
+    ended: Receiver<()>,
+}
+
+/// What the publisher and the broker's thread share.
+struct Shared {
+    topics: Topics,
+    /// The lock is held while its content is queued, so that the newest is queued last.
+    retained: Mutex<Retained>,
+    is_connected: AtomicBool,
+    is_ending: AtomicBool,
+    published: AtomicU64,
+    dropped: AtomicU64,
+}
+
+struct Topics {
+    status: String,
+    map: String,
+    events: String,
+    frames: String,
+}
+
+/// What the broker is to keep, and whether it has to be told.
+struct Retained {
+    status: &'static str,
+    status_due: bool,
+    map: Option<String>,
+    map_due: bool,
+}
+
+const ONLINE: &str = "online";
+const OFFLINE: &str = "offline";
+
+impl Publisher {
+    /// Starts to look for the broker, in a thread of its own, which says through `tell` what becomes of it.
+    pub fn start(options: Options, tell: impl FnMut(BrokerNews) + Send + 'static) -> Self {
+        let topic = |what| format!("toposlam/{}/{what}", options.robot);
+        let topics =
+            Topics { status: topic("status"), map: topic("map"), events: topic("events"), frames: topic("frames") };
+        let Broker { host, port, login } = options.broker;
+        // A publisher that takes the place of one that hangs has its name.
+        let mut mqtt = MqttOptions::new(format!("toposlam-{}", options.robot), host, port);
+        mqtt.set_keep_alive(KEEP_ALIVE).set_max_packet_size(MOST_BYTES, MOST_BYTES).set_last_will(LastWill::new(
+            &topics.status,
+            OFFLINE,
+            QoS::AtLeastOnce,
+            true,
+        ));
+        if let Some((user, password)) = login {
+            mqtt.set_credentials(user, password);
+        }
+        let (client, connection) = Client::new(mqtt, QUEUE_MESSAGES);
+        let shared = Arc::new(Shared {
+            topics,
+            retained: Mutex::new(Retained { status: OFFLINE, status_due: true, map: None, map_due: false }),
+            is_connected: AtomicBool::new(false),
+            is_ending: AtomicBool::new(false),
+            published: AtomicU64::new(0),
+            dropped: AtomicU64::new(0),
+        });
+        let (sender, ended) = channel();
+        let far = (client.clone(), Arc::clone(&shared));
+        thread::spawn(move || {
+            serve(connection, &far.0, &far.1, tell);
+            // Whoever does not wait for it need not know.
+            let _ = sender.send(());
+        });
+        Self { client, shared, frames: options.frames, ended }
+    }
+
+    /// Takes in what happens on the robot's link. Never waits.
+    pub fn hear(&mut self, news: &News) {
+        let mut retained = self.shared.retained();
+        match news {
+            News::Connected => retained.set_status(ONLINE),
+            News::Disconnected(_) | News::Ended => retained.set_status(OFFLINE),
+            News::Heard(event, listener) => {
+                let event = Event::from(event);
+                if changes_map(event) && listener.picture().is_converged() {
+                    retained.set_map(map_json(listener).to_string());
+                }
+                self.shared.offer(&self.client, &self.shared.topics.events, json::event(event).to_string());
+                if let (true, Event::Message(header, message)) = (self.frames, event) {
+                    let mut buffer = [0; MAX_FRAME_BYTES];
+                    // A buffer of that size is always enough.
+                    let frame = Encoder::new(header.sequence).encode(message, &mut buffer).unwrap_or(&[]);
+                    self.shared.offer(&self.client, &self.shared.topics.frames, frame);
+                }
+            }
+            News::Answered(..) => {}
+        }
+        self.shared.settle(&self.client, &mut retained);
+    }
+
+    /// How much was told so far.
+    pub fn counters(&self) -> Counters {
+        Counters {
+            published: self.shared.published.load(Ordering::Relaxed),
+            dropped: self.shared.dropped.load(Ordering::Relaxed),
+        }
+    }
+}
+
+impl Drop for Publisher {
+    fn drop(&mut self) {
+        let mut retained = self.shared.retained();
+        retained.set_status(OFFLINE);
+        self.shared.settle(&self.client, &mut retained);
+        drop(retained);
+        self.shared.is_ending.store(true, Ordering::Relaxed);
+        // When the queue is full the broker has the last will instead.
+        if self.client.try_disconnect().is_ok() && self.shared.is_connected() {
+            let _ = self.ended.recv_timeout(FAREWELL);
+        }
+    }
+}
+
+impl Retained {
+    fn set_status(&mut self, status: &'static str) {
+        self.status_due |= self.status != status;
+        self.status = status;
+    }
+
+    fn set_map(&mut self, map: String) {
+        if self.map.as_ref() != Some(&map) {
+            self.map = Some(map);
+            self.map_due = true;
+        }
+    }
+}
+
+impl Shared {
+    fn retained(&self) -> std::sync::MutexGuard<'_, Retained> {
+        // What it holds is whole at any time.
+        self.retained.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    fn is_connected(&self) -> bool {
+        self.is_connected.load(Ordering::Relaxed)
+    }
+
+    /// Queues what may be lost.
+    fn offer(&self, client: &Client, topic: &str, payload: impl Into<Vec<u8>>) {
+        let is_queued = self.is_connected() && client.try_publish(topic, QoS::AtMostOnce, false, payload).is_ok();
+        let count = if is_queued { &self.published } else { &self.dropped };
+        count.fetch_add(1, Ordering::Relaxed);
+    }
+
+    /// Queues what the broker is to keep and does not have yet; what finds no room is tried again with the next news.
+    fn settle(&self, client: &Client, retained: &mut Retained) {
+        if !self.is_connected() {
+            return;
+        }
+        let queue = |topic: &str, payload: &str| {
+            let is_queued = client.try_publish(topic, QoS::AtLeastOnce, true, payload).is_ok();
+            self.published.fetch_add(u64::from(is_queued), Ordering::Relaxed);
+            !is_queued
+        };
+        retained.status_due = retained.status_due && queue(&self.topics.status, retained.status);
+        if let (true, Some(map)) = (retained.map_due, &retained.map) {
+            retained.map_due = queue(&self.topics.map, map);
+        }
+    }
+}
+
+/// Keeps up the connection to the broker until the publisher ends.
+fn serve(
+    mut connection: rumqttc::Connection,
+    client: &Client,
+    shared: &Shared,
+    mut tell: impl FnMut(BrokerNews) + Send,
+) {
+    let mut last_reason = String::new();
+    for event in connection.iter() {
+        match event {
+            Ok(rumqttc::Event::Incoming(Packet::ConnAck(_))) => {
+                let mut retained = shared.retained();
+                // Another broker, or one that was started anew, knows nothing.
+                (retained.status_due, retained.map_due) = (true, true);
+                shared.is_connected.store(true, Ordering::Relaxed);
+                shared.settle(client, &mut retained);
+                drop(retained);
+                last_reason.clear();
+                tell(BrokerNews::Connected);
+            }
+            Ok(_) => {}
+            Err(error) => {
+                shared.is_connected.store(false, Ordering::Relaxed);
+                if shared.is_ending.load(Ordering::Relaxed) || matches!(error, ConnectionError::RequestsDone) {
+                    return;
+                }
+                let reason = error.to_string();
+                if reason != last_reason {
+                    tell(BrokerNews::Disconnected(reason.clone()));
+                    last_reason = reason;
+                }
+                thread::sleep(RETRY);
+            }
+        }
+    }
+}
+
+fn changes_map(event: Event<'_>) -> bool {
+    matches!(
+        event,
+        Event::Message(
+            _,
+            Message::Map { .. }
+                | Message::Vertex { .. }
+                | Message::Edge { .. }
+                | Message::Row(_)
+                | Message::Location(_)
+                | Message::Renamed(_)
+        )
+    )
+}
+
+/// A map as JSON: `vertices`, each with `vertex`, `radius_mm` and `visits`; `edges`, each a pair of vertices; `location`,
+/// `null` or the `vertex` at which the robot is and the `place_index` of when; and `digest`, the number by which the robot names the map.
+pub fn map_json(listener: &Listener) -> Value {
+    let map = listener.map();
+    let vertices: Vec<Value> = (0_u8..)
+        .zip(&map.vertices)
+        .map(|(vertex, label)| json!({"vertex": vertex, "radius_mm": label.radius_mm, "visits": label.visits}))
+        .collect();
+    let location = listener
+        .picture()
+        .location()
+        .map(|location| json!({"vertex": location.vertex, "place_index": location.place_index}));
+    json!({"vertices": vertices, "edges": map.edges, "location": location, "digest": map.digest()})
+}

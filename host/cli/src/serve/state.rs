@@ -1,0 +1,146 @@
+//! What is known of a robot as JSON, in two parts: what a place changes, and what each ring frame changes.
+//!
+//! ```
+//! use toposlam_cli::serve::state::State;
+//! use toposlam_link::{link::News, watch::Watch};
+//!
+//! let mut watch = Watch::new("tcp:robot:7070");
+//! watch.hear(News::Connected);
+//! let state = State::of(&mut watch);
+//! assert_eq!(state.map["connection"]["state"], "open");
+//! assert_eq!((state.map["edges"].to_string(), state.live["line"]["lost"].as_u64()), ("[]".to_owned(), Some(0)));
+//! ```
+
+use serde_json::{Value, json};
+use toposlam::FaultKind;
+
+use toposlam_link::listener::{Listener, Understanding};
+use toposlam_link::watch::{Connection, Watch};
+use toposlam_link::{json, wording};
+
+/// Both parts.
+#[derive(Clone, Debug, PartialEq)]
+pub struct State {
+    /// The line and whether it is open, the map where the layout draws it, where the robot may be, why it believes so, its journey, and
+    /// its faults.
+    ///
+    /// Distances are in millimetres, `null` when they are infinite; `x` and `y` count edges, `y` points up. What was not heard is `null`.
+    pub map: Value,
+    /// The newest ring frame, what the drive does, and how well the robot is heard.
+    ///
+    /// `damaged` counts pieces of the line that were no whole frame, `unknown` whole frames that mean nothing here.
+    pub live: Value,
+}
+
+impl State {
+    /// All that is known. Arranges the map.
+    pub fn of(watch: &mut Watch) -> Self {
+        watch.arrange();
+        Self { map: map(watch), live: live(watch.listener()) }
+    }
+}
+
+fn map(watch: &Watch) -> Value {
+    let listener = watch.listener();
+    let picture = listener.picture();
+    let map = watch.map();
+    let vertices: Vec<Value> = (0..)
+        .zip(map.vertices.iter().zip(watch.points()))
+        .map(|(number, (vertex, point)): (usize, _)| {
+            json!({
+                "vertex": number,
+                "x": thousandths(point.x),
+                "y": thousandths(point.y),
+                "radius_mm": vertex.radius_mm,
+                "visits": vertex.visits,
+            })
+        })
+        .collect();
+    let evidence = picture.evidence();
+    json!({
+        "line": watch.line(),
+        "connection": connection(watch.connection()),
+        "understanding": understanding(listener),
+        "hello": picture.hello(),
+        "vertices": vertices,
+        "edges": map.edges,
+        "converged": picture.is_converged(),
+        "location": picture.location(),
+        "belief": picture.belief(),
+        "evidence": evidence.map(|evidence| json!({
+            "place_index": evidence.place_index,
+            "consistency_mm": finite_mm(evidence.consistency_mm),
+            "lead_nats": thousandths(wording::nats(evidence.lead_q16)),
+            "distinct_hypotheses": evidence.distinct_hypotheses,
+        })),
+        "worst": picture.worst().map(|worst| json!({
+            "distance_mm": finite_mm(worst.distance_mm),
+            "newest_age": worst.newest_age,
+            "vertices": worst.vertices,
+        })),
+        "journey": picture.journey().map(|journey| json!({
+            "vertex": journey.vertex,
+            "state": journey.state.to_string(),
+        })),
+        "faults": faults(listener),
+    })
+}
+
+fn live(listener: &Listener) -> Value {
+    let counters = listener.counters();
+    json!({
+        "ring": listener.ring().map(|(frame_index, echoes)| json!({
+            "frame_index": frame_index,
+            "ranges_mm": json::ranges_mm(&echoes),
+        })),
+        "drive": listener.drive().map(|drive| json!({
+            "frame_index": drive.frame_index,
+            "heading_mrad": drive.heading_mrad,
+            "speed_permille": drive.speed_permille,
+            "doing": wording::drive_state(drive.state),
+        })),
+        "line": {
+            "messages": counters.messages,
+            "lost": counters.lost,
+            "damaged": counters.corrupt.saturating_add(counters.cut).saturating_add(counters.too_long),
+            "unknown": counters.unknown_version.saturating_add(counters.unknown_message),
+        },
+    })
+}
+
+fn connection(connection: &Connection) -> Value {
+    match connection {
+        Connection::Opening => json!({"state": "opening"}),
+        Connection::Open => json!({"state": "open"}),
+        Connection::Cut(reason) => json!({"state": "cut", "reason": reason}),
+        Connection::Ended => json!({"state": "ended"}),
+    }
+}
+
+fn understanding(listener: &Listener) -> Value {
+    let understanding = listener.understanding();
+    let level = match understanding {
+        Understanding::Unknown => "unknown",
+        Understanding::Whole => "whole",
+        Understanding::Partly { .. } => "partly",
+        Understanding::Not(_) => "not",
+    };
+    json!({"level": level, "text": understanding.to_string()})
+}
+
+fn faults(listener: &Listener) -> Vec<Value> {
+    let counts = FaultKind::ALL.iter().map(|&kind| (kind, listener.picture().fault(kind)));
+    counts
+        .filter(|&(_, count)| count > 0)
+        .map(|(kind, count)| json!({"kind": format!("{kind:?}"), "count": count}))
+        .collect()
+}
+
+fn finite_mm(distance_mm: u16) -> Option<u16> {
+    (distance_mm != u16::MAX).then_some(distance_mm)
+}
+
+/// Rounded: nobody sees more of it, and it is sent often.
+fn thousandths(value: f64) -> f64 {
+    (value * 1000.0).round() / 1000.0
+}

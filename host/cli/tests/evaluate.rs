@@ -1,0 +1,333 @@
+//! `toposlam evaluate` as a person or a script runs it.
+
+use serde_json::{Value, json};
+use std::{
+    fs,
+    path::Path,
+    process::{Command, Output},
+};
+use toposlam::RobustConfig;
+
+fn evaluate(arguments: &[&str], threads: &str) -> Output {
+    Command::new(env!("CARGO_BIN_EXE_toposlam"))
+        .current_dir(concat!(env!("CARGO_MANIFEST_DIR"), "/../eval"))
+        .env("RUST_BACKTRACE", "0")
+        .args(["evaluate", "--threads", threads])
+        .args(arguments)
+        .output()
+        .unwrap()
+}
+
+/// The one JSON object on the standard output, without the times, which differ from run to run.
+fn report(arguments: &[&str], threads: &str) -> Value {
+    let output = evaluate(arguments, threads);
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    let mut report: Value = serde_json::from_slice(&output.stdout).unwrap();
+    for row in report["rows"].as_array_mut().unwrap() {
+        let row = row.as_object_mut().unwrap();
+        assert!(row.remove("seconds_per_place").unwrap().as_f64().unwrap() >= 0.0);
+        assert!(row.remove("prior_seconds").unwrap().as_f64().unwrap() >= 0.0);
+    }
+    report
+}
+
+fn refusal(arguments: &[&str]) -> String {
+    let output = evaluate(arguments, "1");
+    assert!(!output.status.success());
+    assert!(output.stdout.is_empty());
+    String::from_utf8(output.stderr).unwrap()
+}
+
+fn json_file(file: &Path) -> Value {
+    serde_json::from_slice(&fs::read(file).unwrap()).unwrap()
+}
+
+const SURROGATE: &str = "environments/wean-surrogate-sd.toml";
+const TABLE_I: &str = "environments/table-i.toml";
+const PLACEMENTS: &str = "1,2,environments/wean-surrogate-sd.toml";
+const FAMILY: &str = "1,3,8,10,2-3,4,0.03,right-resolving";
+
+#[test]
+fn the_report_has_the_documented_keys_and_shares_between_0_and_1() {
+    let cases = ["--environment", TABLE_I, SURROGATE, "--placements", PLACEMENTS, "--family", FAMILY];
+    let robust = RobustConfig::DEFAULT;
+    for (filter, parameters) in [
+        (
+            "robust",
+            json!({
+                "hypotheses": 4, "moves": robust.moves, "noise_mm": robust.noise_mm,
+                "wrong_degree": f64::from(robust.wrong_degree_permille) / 1000.0,
+                "wrong_turn": f64::from(robust.wrong_turn_permille) / 1000.0,
+            }),
+        ),
+        (
+            "paper",
+            json!({
+                "consistency": "two-sided", "hypotheses": 4, "penalty": 0.1, "sigma_consistency_mm": 30,
+                "sigma_label_mm": 50,
+            }),
+        ),
+    ] {
+        let course = ["--paths", "4", "--lengths", "10,20", "--hypotheses", "4", "--filter", filter];
+        let report = report(&[cases.as_slice(), &course].concat(), "2");
+        let settings = json!({
+            "seed": 1, "prior": "none", "hints": "none", "fingerprint_bits": 12, "ngram_length": 5,
+            "polish": 10, "polish_prior": 10, "search_from_truth": 0,
+            "filters": { filter: parameters },
+        });
+        assert_eq!(report["settings"], settings);
+        let family = format!("family {FAMILY}");
+        let cases = [
+            ("table-i", 1, json!(null)),
+            ("wean-surrogate-sd", 1, json!(null)),
+            ("wean-surrogate-sd, 2 placements", 2, json!(1)),
+            (&*family, 3, json!(1)),
+        ];
+        let expected = cases.iter().flat_map(|case| [(case, 10), (case, 20)]);
+        let rows = report["rows"].as_array().unwrap();
+        assert_eq!(rows.len(), 8);
+        for (row, ((name, environments, seed), length)) in rows.iter().zip(expected) {
+            check_row(row, filter);
+            for (key, value) in [
+                ("name", json!(name)),
+                ("environments", json!(environments)),
+                ("environment_seed", seed.clone()),
+                ("length", json!(length)),
+            ] {
+                assert_eq!(row[key], value, "{key}");
+            }
+        }
+    }
+}
+
+fn check_row(row: &Value, filter: &str) {
+    let mut keys: Vec<_> = row.as_object().unwrap().keys().map(String::as_str).collect();
+    keys.sort_unstable();
+    let expected = [
+        "consistency_bins",
+        "consistency_mm",
+        "edge_f1",
+        "environment_seed",
+        "environments",
+        "exact",
+        "exact_interval",
+        "filter",
+        "isomorphic",
+        "length",
+        "location_online",
+        "location_smoothed",
+        "name",
+        "paths",
+        "paths_not_exhaustive",
+        "places_until_exact",
+        "vertices",
+        "vertices_full",
+    ];
+    assert_eq!(keys, expected);
+    assert_eq!((&row["filter"], &row["paths"]), (&json!(filter), &json!(4)));
+    let number = |key: &str| row[key].as_f64().unwrap();
+    for key in ["exact", "isomorphic", "edge_f1", "location_online", "location_smoothed"] {
+        assert!((0.0..=1.0).contains(&number(key)), "{key}");
+    }
+    let interval = [0, 1].map(|end| row["exact_interval"][end].as_f64().unwrap());
+    assert!(interval[0] <= number("exact") && number("exact") <= interval[1]);
+    for key in ["vertices", "consistency_bins"] {
+        let maps = row[key].as_object().unwrap().values().map(|maps| maps.as_u64().unwrap());
+        assert_eq!(maps.sum::<u64>(), 4, "{key}");
+    }
+    assert!(row["consistency_mm"]["median"].as_u64().unwrap() <= row["consistency_mm"]["p90"].as_u64().unwrap());
+}
+
+#[test]
+fn the_same_seed_gives_the_same_report_on_any_number_of_threads() {
+    for filter in ["robust", "paper"] {
+        for prior in ["path", "exploration", "none"] {
+            let course = [
+                "--environment",
+                SURROGATE,
+                "--family",
+                FAMILY,
+                "--paths",
+                "4",
+                "--length",
+                "12",
+                "--polish",
+                "1",
+                "--polish-prior",
+                "0",
+            ];
+            let more = ["--filter", filter, "--prior", prior, "--hints", "both,missing=0.2,wrong=0.1"];
+            let run = |seed, threads| report(&[&course, more.as_slice(), &["--seed", seed]].concat(), threads);
+            let first = run("7", "1");
+            assert_eq!(first, run("7", "3"), "{filter} {prior}");
+            assert_ne!(first["rows"], run("8", "1")["rows"], "{filter} {prior}");
+        }
+    }
+}
+
+#[test]
+fn a_case_gives_the_same_results_whatever_is_evaluated_beside_it() {
+    let run = |cases: &[&str]| report(&[&["--filter", "paper", "--paths", "2", "--length", "12"], cases].concat(), "2");
+    let alone = run(&["--environment", SURROGATE]);
+    assert_eq!(run(&["--environment", TABLE_I, SURROGATE, "--family", FAMILY])["rows"][1], alone["rows"][0]);
+}
+
+#[test]
+fn an_earlier_check_point_changes_nothing_of_a_later_one() {
+    let run =
+        |lengths| report(&["--environment", SURROGATE, "--paths", "3", "--filter", "paper", "--lengths", lengths], "2");
+    assert_eq!(run("20,60")["rows"][1], run("60")["rows"][0]);
+}
+
+#[test]
+fn a_building_of_distinct_places_is_mapped_exactly_when_vertices_are_dear() {
+    let directory = tempfile::tempdir().unwrap();
+    let file = directory.path().join("distinct.toml");
+    let places = [(1, 700), (2, 1400), (3, 2100), (4, 2800)];
+    let places = places.map(|(id, mean)| format!("[[place]]\nid = {id}\nmean_mm = {mean}\nsd_mm = 2.5\n")).concat();
+    fs::write(&file, format!("name = \"distinct\"\nedges = [[1, 2], [2, 3], [3, 1], [3, 4]]\n{places}")).unwrap();
+    let mut arguments = vec!["--environment", file.to_str().unwrap(), "--paths", "4", "--length", "40"];
+    arguments.extend(["--filter", "paper", "--prior", "exploration", "--consistency", "map-to-history"]);
+    arguments.extend(["--penalty", "0.5"]);
+    let report = report(&arguments, "2");
+    let row = &report["rows"][0];
+    assert_eq!(row["vertices"], json!({ "4": 4 }));
+    for key in ["exact", "isomorphic", "edge_f1", "location_online", "location_smoothed"] {
+        assert_eq!(row[key], json!(1.0), "{key}");
+    }
+    assert!(row["consistency_mm"]["p90"].as_u64().unwrap() <= 20);
+    let until_exact = row["places_until_exact"]["p90"].as_u64().unwrap();
+    assert!((10..=40).contains(&until_exact) && until_exact.is_multiple_of(10));
+}
+
+#[test]
+fn the_table_tells_the_seed_and_names_every_row() {
+    let arguments = ["--environment", TABLE_I, "--family", FAMILY, "--paths", "1", "--lengths", "4,8", "--seed", "5"];
+    let output = evaluate(&[arguments.as_slice(), &["--format", "table"]].concat(), "1");
+    let table = String::from_utf8(output.stdout).unwrap();
+    let lines: Vec<&str> = table.lines().collect();
+    assert_eq!(lines.len(), 6);
+    assert!(lines[0].starts_with("seed 5, prior none, hints none, 12 bits, n = 5, 10 slices; robust: hypotheses 10"));
+    assert!(lines[1].starts_with("name "));
+    assert!(lines[2].starts_with("table-i ") && lines[3].starts_with("table-i "));
+    assert!(lines[5].starts_with(&format!("family {FAMILY} robust")));
+}
+
+#[test]
+fn exported_paths_are_what_the_filter_sees_and_their_truth() {
+    let directory = tempfile::tempdir().unwrap();
+    let mut arguments = vec!["--environment", TABLE_I, "--family", FAMILY, "--family", FAMILY, "--paths", "4"];
+    arguments.extend(["--lengths", "10,30", "--hints", "both,missing=0.3", "--seed", "9", "--fingerprint-bits", "8"]);
+    report(&[arguments.as_slice(), &["--export", directory.path().to_str().unwrap()]].concat(), "2");
+
+    let family = "family-1-3-8-10-2-3-4-0.03-right-resolving";
+    let entry = |directory: &str, name: &str| json!({"directory": directory, "name": name, "paths": 4, "lengths": [10, 30], "seed": 9});
+    let name = format!("family {FAMILY}");
+    let again = format!("{family}-again");
+    let manifest = json!([entry("table-i", "table-i"), entry(family, &name), entry(&again, &name)]);
+    assert_eq!(json_file(&directory.path().join("manifest.json")), manifest);
+
+    for (folder, path) in [("table-i", 0), (family, 0), (family, 3), (&again, 3)] {
+        check_exported_path(&directory.path().join(folder), path);
+    }
+    let csv =
+        |folder: &str, path| fs::read_to_string(directory.path().join(folder).join(format!("{path}.csv"))).unwrap();
+    assert_eq!(csv(family, 2), csv(&again, 2));
+    let environment =
+        |path| json_file(&directory.path().join(family).join(format!("{path}.truth.json")))["labels"].clone();
+    assert_eq!(environment(0), environment(3), "path 3 is in the first environment of three again");
+    assert_ne!(environment(0), environment(1));
+}
+
+fn check_exported_path(folder: &Path, path: u64) {
+    let csv = fs::read_to_string(folder.join(format!("{path}.csv"))).unwrap();
+    let mut lines = csv.lines();
+    assert_eq!(lines.next(), Some("place,radius_mm,turn,degree"));
+    let visits: Vec<Vec<&str>> = lines.map(|line| line.split(',').collect()).collect();
+    let truth = json_file(&folder.join(format!("{path}.truth.json")));
+    let numbers = |value: &Value| -> Vec<usize> {
+        value.as_array().unwrap().iter().map(|number| number.as_u64().unwrap() as usize).collect()
+    };
+    let places = numbers(&truth["places"]);
+    assert_eq!((visits.len(), places.len()), (30, 30));
+    for (step, visit) in visits.iter().enumerate() {
+        assert_eq!(visit[0], step.to_string());
+        // Within five deviations, half of a level of 32 mm, and the rounding.
+        let label = &truth["labels"][places[step]];
+        let (mean_mm, sd_mm) = (label[0].as_f64().unwrap(), label[1].as_f64().unwrap());
+        assert!((visit[1].parse::<f64>().unwrap() - mean_mm).abs() <= 5.0 * sd_mm + 18.0);
+        let turn = if step >= 2 && places[step] == places[step - 2] { "back" } else { "on" };
+        assert!(visit[2].is_empty() || step >= 2 && visit[2] == turn);
+        assert!(visit[3].is_empty() || (1..=7).contains(&visit[3].parse().unwrap()));
+    }
+    let edges = |value: &Value| value.as_array().unwrap().iter().map(numbers).collect::<Vec<_>>();
+    let all = edges(&truth["edges"]);
+    assert!(places.windows(2).all(|step| all.contains(&vec![step[0].min(step[1]), step[0].max(step[1])])));
+    assert_eq!(truth["lengths"], json!([10, 30]));
+    for length in [10, 30] {
+        let judged = &truth["truth"][length.to_string()];
+        let classes = numbers(&judged["classes"]);
+        assert_eq!(classes.len(), length);
+        assert_eq!(classes.iter().max().unwrap() + 1, judged["vertices"].as_u64().unwrap() as usize);
+        let walked = |step: &[usize]| vec![step[0].min(step[1]), step[0].max(step[1])];
+        let mut traversed: Vec<_> = classes.windows(2).map(walked).collect();
+        traversed.sort();
+        traversed.dedup();
+        assert_eq!(edges(&judged["edges"]), traversed);
+    }
+    assert_eq!(truth["classes"], truth["truth"]["30"]["classes"]);
+}
+
+#[test]
+fn plots_show_both_filters_on_the_same_paths() {
+    let directory = tempfile::tempdir().unwrap();
+    let plots = directory.path().join("plots");
+    let arguments = ["--environment", TABLE_I, "--paths", "2", "--lengths", "6,12", "--penalty", "0.2", "--moves", "3"];
+    let report = report(&[arguments.as_slice(), &["--plot", plots.to_str().unwrap()]].concat(), "2");
+    let rows: Vec<_> = report["rows"].as_array().unwrap().iter().map(|row| (&row["filter"], &row["length"])).collect();
+    let [robust, paper] = ["robust", "paper"].map(Value::from);
+    assert_eq!(rows, [(&robust, &json!(6)), (&robust, &json!(12)), (&paper, &json!(6)), (&paper, &json!(12))]);
+    for name in ["fig4.svg", "fig5.svg"] {
+        let picture = fs::read_to_string(plots.join(name)).unwrap();
+        assert!(picture.contains("table-i, 2 paths of 12 places"));
+        assert!(picture.contains("robust filter: ") && picture.contains("paper's filter: "));
+    }
+}
+
+#[test]
+fn what_cannot_be_evaluated_is_refused_with_its_reason() {
+    let missing = refusal(&["--environment", "nowhere.toml"]);
+    assert!(missing.contains("--environment nowhere.toml") && missing.contains("cannot read the environment"));
+    assert!(refusal(&["--placements", "1,2,nowhere.toml"]).contains("--placements nowhere.toml"));
+    assert!(refusal(&["--placements", "1,0,nowhere.toml"]).contains("--placements"));
+    let family = refusal(&["--family", "1,1,8,7,2,3,0.03"]);
+    assert!(family.contains("--family") && family.contains("V_MAX = 7: must be V_MIN or more"));
+    assert!(refusal(&["--family", "1,1,3,3,2,1,0.03"]).contains("no such environment"));
+    assert!(refusal(&[]).contains("--environment"));
+    for (arguments, reason) in [
+        (
+            &["--filter", "paper", "--prior", "path", "--length", "5000"][..],
+            "the prior may need more than 8192 n-grams",
+        ),
+        (&["--filter", "paper", "--length", "5000"], "may visit at most 2048 places"),
+        (&["--length", "20000"], "may visit at most 16384 places"),
+        (&["--filter", "paper", "--particles", "200"], "particles is out of its range"),
+        (&["--hypotheses", "200"], "hypotheses is out of its range"),
+        (&["--noise-mm", "0"], "noise_mm is out of its range"),
+        (&["--wrong-turn", "0.9"], "wrong_turn_permille is out of its range"),
+        (&["--wrong-degree", "0.0005"], "--wrong-degree"),
+        (&["--ngram-length", "8"], "--ngram-length"),
+        (&["--filter", "paper", "--penalty", "1"], "--penalty"),
+        (&["--penalty", "0.1"], "--penalty needs --filter paper"),
+        (&["--filter", "paper", "--moves", "1"], "--moves needs --filter robust"),
+        (&["--filter", "paper", "--plot", "nowhere"], "--plot"),
+        (&["--length", "0"], "--lengths"),
+        (&["--lengths", "50,20"], "--lengths: must be in ascending order"),
+        (&["--fingerprint-bits", "13"], "--fingerprint-bits"),
+        (&["--hints", "left"], "--hints"),
+        (&["--hints", "turn,wrong=2"], "wrong=2: a probability is a number from 0 to 1"),
+    ] {
+        let refusal = refusal(&[&["--environment", TABLE_I, "--paths", "1"], arguments].concat());
+        assert!(refusal.contains(reason), "{arguments:?}: {refusal}");
+    }
+}

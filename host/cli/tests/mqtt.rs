@@ -1,0 +1,258 @@
+//! `publish` and a real broker, mosquitto: what a subscriber gets, and what becomes of robot and broker when one is gone.
+#![cfg(feature = "mqtt")]
+
+use std::io::Write;
+use std::net::{TcpListener, TcpStream};
+use std::path::Path;
+use std::process::{Child, Command, Stdio};
+use std::sync::mpsc::channel;
+use std::thread;
+use std::time::{Duration, Instant};
+
+use rumqttc::{Client, Connection, Event, MqttOptions, Packet, Publish, QoS};
+use serde_json::Value;
+use toposlam::reference::SNAPSHOT_BYTES;
+use toposlam_cli::publish::{BrokerNews, Options, Publisher};
+use toposlam_link::broadcast::Broadcast;
+use toposlam_link::link::News;
+use toposlam_link::listener::Listener;
+use toposlam_link::topology::TopologicalMap;
+use toposlam_sim::exploration::Exploration;
+use toposlam_sim::world::{Plan, RobotModel};
+
+/// When something that has to happen has not.
+const DEADLINE: Duration = Duration::from_secs(60);
+const SHORT: Duration = Duration::from_millis(2);
+const PLACES: usize = 12;
+
+/// A process that ends with the test.
+struct Process(Child);
+
+impl Drop for Process {
+    fn drop(&mut self) {
+        let _ = self.0.kill();
+        let _ = self.0.wait();
+    }
+}
+
+/// Where Debian puts the broker, which is not on everybody's path.
+fn mosquitto() -> Option<&'static str> {
+    let found = ["mosquitto", "/usr/sbin/mosquitto"]
+        .into_iter()
+        .find(|name| Command::new(name).arg("-h").stdout(Stdio::null()).stderr(Stdio::null()).status().is_ok());
+    if found.is_none() {
+        assert!(std::env::var("CI").is_err(), "mosquitto is missing: apt-get install mosquitto");
+        eprintln!("SKIPPED: mosquitto is missing: apt-get install mosquitto");
+    }
+    found
+}
+
+fn free_port() -> u16 {
+    TcpListener::bind("127.0.0.1:0").unwrap().local_addr().unwrap().port()
+}
+
+fn start_broker(program: &str, directory: &Path, port: u16) -> Process {
+    let settings = directory.join("mosquitto.conf");
+    std::fs::write(&settings, format!("listener {port} 127.0.0.1\nallow_anonymous true\npersistence false\n")).unwrap();
+    let mut command = Command::new(program);
+    let broker = command.arg("-c").arg(&settings).stdout(Stdio::null()).stderr(Stdio::null()).spawn();
+    let broker = Process(broker.unwrap());
+    let start = Instant::now();
+    while TcpStream::connect(("127.0.0.1", port)).is_err() {
+        assert!(start.elapsed() < DEADLINE, "the broker does not answer");
+        thread::sleep(SHORT);
+    }
+    broker
+}
+
+struct Subscriber {
+    connection: Connection,
+    _client: Client,
+}
+
+impl Subscriber {
+    /// Subscribes to everything of a robot.
+    fn connect(port: u16, name: &str) -> Self {
+        let mut options = MqttOptions::new(name, "127.0.0.1", port);
+        options.set_max_packet_size(1 << 17, 1 << 17);
+        let (client, mut connection) = Client::new(options, 10);
+        client.subscribe("toposlam/kitchen/#", QoS::AtLeastOnce).unwrap();
+        while !matches!(connection.recv_timeout(DEADLINE).unwrap().unwrap(), Event::Incoming(Packet::SubAck(_))) {}
+        Self { connection, _client: client }
+    }
+
+    /// Waits for a message.
+    fn wait_for(&mut self, mut is_it: impl FnMut(&Publish) -> bool) -> Publish {
+        let start = Instant::now();
+        loop {
+            assert!(start.elapsed() < DEADLINE, "it did not come");
+            if let Event::Incoming(Packet::Publish(message)) = self.connection.recv_timeout(DEADLINE).unwrap().unwrap()
+                && is_it(&message)
+            {
+                return message;
+            }
+        }
+    }
+
+    fn wait_for_map(&mut self, map: &TopologicalMap) -> Publish {
+        self.wait_for(|message| message.topic == "toposlam/kitchen/map" && is_map(message, map))
+    }
+
+    fn wait_for_status(&mut self, status: &str) -> Publish {
+        self.wait_for(|message| message.topic == "toposlam/kitchen/status" && message.payload == status.as_bytes())
+    }
+}
+
+/// Whether a message holds that map, every bit of it.
+fn is_map(message: &Publish, map: &TopologicalMap) -> bool {
+    let json: Value = serde_json::from_slice(&message.payload).unwrap();
+    let number = |value: &Value| value.as_u64().unwrap();
+    let labels = json["vertices"].as_array().unwrap().iter().enumerate().map(|(index, vertex)| {
+        assert_eq!(number(&vertex["vertex"]), index as u64);
+        (number(&vertex["radius_mm"]), number(&vertex["visits"]))
+    });
+    let edges = json["edges"].as_array().unwrap().iter().map(|edge| (number(&edge[0]), number(&edge[1])));
+    labels.eq(map.vertices.iter().map(|vertex| (vertex.radius_mm.into(), vertex.visits.into())))
+        && edges.eq(map.edges.iter().map(|&(a, b)| (a.into(), b.into())))
+        && number(&json["digest"]) == u64::from(map.digest())
+}
+
+/// A robot that explores once someone listens, and then only repeats what it knows.
+fn robot() -> String {
+    let mut broadcast = Broadcast::bind("127.0.0.1:0").unwrap();
+    let line = format!("tcp:{}", broadcast.address().unwrap());
+    thread::spawn(move || {
+        let mut say = |said: &[u8]| {
+            broadcast.exchange(said);
+            thread::sleep(SHORT);
+            broadcast.listeners()
+        };
+        while say(&[]) == 0 {}
+        let mut buffer = [0; SNAPSHOT_BYTES];
+        let mut exploration = explored(&mut buffer, |said| {
+            say(said);
+        });
+        exploration.command(toposlam::wire::Command::Pause { on: true });
+        loop {
+            exploration.advance();
+            say(&exploration.board().sent);
+        }
+    });
+    line
+}
+
+/// Lets a robot explore until it has said all of its map: the same one each time.
+fn explored(buffer: &mut [u8], mut say: impl FnMut(&[u8])) -> Exploration<'_> {
+    let plan = Plan::built_in("flat").unwrap();
+    let mut exploration = Exploration::start(&plan, RobotModel::default(), 1, buffer).unwrap();
+    let mut listener = Listener::new();
+    while exploration.places() < PLACES || !listener.picture().is_converged() || listener.map() != map(&exploration) {
+        exploration.advance();
+        let said = &exploration.board().sent;
+        listener.feed(said, |_, _| ());
+        say(said);
+    }
+    exploration
+}
+
+fn map(exploration: &Exploration<'_>) -> TopologicalMap {
+    TopologicalMap::from(exploration.robot().mapper().map())
+}
+
+#[test]
+fn whoever_subscribes_late_gets_the_robots_map_and_learns_when_the_publisher_is_killed() {
+    let Some(program) = mosquitto() else { return };
+    let directory = tempfile::tempdir().unwrap();
+    let port = free_port();
+    let _broker = start_broker(program, directory.path(), port);
+    let mut early = Subscriber::connect(port, "early");
+
+    let map = map(&explored(&mut [0; SNAPSHOT_BYTES], |_| ()));
+    let line = robot();
+    let publisher = Command::new(env!("CARGO_BIN_EXE_toposlam"))
+        .args(["publish", &line, "--robot", "kitchen", "--frames", "--broker", &format!("mqtt://127.0.0.1:{port}")])
+        .stderr(Stdio::null())
+        .spawn()
+        .unwrap();
+    let mut publisher = Process(publisher);
+    let (mut listener, mut places, mut has_map) = (Listener::new(), 0, false);
+    early.wait_for(|message| {
+        match message.topic.as_str() {
+            "toposlam/kitchen/frames" => listener.feed(&message.payload, |_, _| ()),
+            "toposlam/kitchen/events" => {
+                let event: Value = serde_json::from_slice(&message.payload).unwrap();
+                places += usize::from(event["event"] == "Place");
+            }
+            _ => {}
+        }
+        has_map |= message.topic == "toposlam/kitchen/map" && is_map(message, &map);
+        has_map && places > 0 && listener.picture().is_converged() && listener.map() == map
+    });
+    assert!(map.vertices.len() > 2 && !map.edges.is_empty());
+    assert_eq!((listener.counters().corrupt, listener.counters().unknown_message), (0, 0));
+
+    let mut late = Subscriber::connect(port, "late");
+    assert!(late.wait_for_map(&map).retain);
+    let mut later = Subscriber::connect(port, "later");
+    assert!(later.wait_for_status("online").retain);
+    publisher.0.kill().unwrap();
+    late.wait_for_status("offline");
+}
+
+#[test]
+fn a_broker_that_was_away_gets_the_newest_map_and_what_it_missed_is_counted() {
+    let Some(program) = mosquitto() else { return };
+    let directory = tempfile::tempdir().unwrap();
+    let port = free_port();
+    let options = Options::new(format!("mqtt://127.0.0.1:{port}").parse().unwrap(), "kitchen").unwrap();
+    let (sender, news) = channel();
+    let mut publisher = Publisher::start(options, move |news| sender.send(news).unwrap_or_default());
+    publisher.hear(&News::Connected);
+    let (mut listener, mut events) = (Listener::new(), 0);
+    let mut buffer = [0; SNAPSHOT_BYTES];
+    let exploration = explored(&mut buffer, |said| {
+        listener.feed(said, |listener, event| {
+            publisher.hear(&News::heard(listener, event));
+            events += 1;
+        });
+    });
+    assert_eq!(publisher.counters().dropped, events);
+    assert!(matches!(news.recv_timeout(DEADLINE).unwrap(), BrokerNews::Disconnected(_)));
+
+    for _ in 0..2 {
+        let broker = start_broker(program, directory.path(), port);
+        assert_eq!(news.recv_timeout(DEADLINE).unwrap(), BrokerNews::Connected);
+        let mut subscriber = Subscriber::connect(port, "subscriber");
+        subscriber.wait_for_map(&map(&exploration));
+        drop(broker);
+        assert!(matches!(news.recv_timeout(DEADLINE).unwrap(), BrokerNews::Disconnected(_)));
+    }
+    let _broker = start_broker(program, directory.path(), port);
+    let mut subscriber = Subscriber::connect(port, "subscriber");
+    subscriber.wait_for_status("online");
+    drop(publisher);
+    subscriber.wait_for_status("offline");
+}
+
+#[test]
+fn a_broker_that_does_not_read_holds_nobody_up() {
+    const SOME: u64 = 1000;
+    let broker = TcpListener::bind("127.0.0.1:0").unwrap();
+    let address = format!("mqtt://{}", broker.local_addr().unwrap());
+    let (sender, news) = channel();
+    let mut publisher = Publisher::start(Options::new(address.parse().unwrap(), "kitchen").unwrap(), move |news| {
+        sender.send(news).unwrap_or_default();
+    });
+    let (mut connection, _) = broker.accept().unwrap();
+    // The connection is accepted, and nothing of it read.
+    connection.write_all(&[0x20, 2, 0, 0]).unwrap();
+    assert_eq!(news.recv_timeout(DEADLINE).unwrap(), BrokerNews::Connected);
+    let (mut listener, mut events) = (Listener::new(), 0);
+    while publisher.counters().dropped < SOME {
+        listener.feed(&[7, 0], |listener, event| publisher.hear(&News::heard(listener, event)));
+        events += 1;
+    }
+    // The status is published as well.
+    let counters = publisher.counters();
+    assert!((events..=events + 1).contains(&(counters.published + counters.dropped)), "{events} {counters:?}");
+}

@@ -1,0 +1,109 @@
+//! `record` and `play` as a person meets them: how a recording ends, and that it can be heard like a robot.
+
+use std::io::{BufRead, BufReader, Read};
+use std::path::Path;
+use std::process::{Child, Command, Stdio};
+
+use toposlam_link::log::{Recording, TimedFrame};
+
+fn toposlam(arguments: &[&str]) -> Command {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_toposlam"));
+    command.args(arguments);
+    command
+}
+
+fn printed(arguments: &[&str]) -> String {
+    let output = toposlam(arguments).output().unwrap();
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    String::from_utf8(output.stdout).unwrap()
+}
+
+/// A process that ends with the test.
+struct Process(Child);
+
+impl Drop for Process {
+    fn drop(&mut self) {
+        let _ = self.0.kill();
+        let _ = self.0.wait();
+    }
+}
+
+/// What is at the end of a line of text that a program prints first: `… tcp:HOST:PORT`.
+fn address(output: impl Read) -> String {
+    let mut text = String::new();
+    BufReader::new(output).read_line(&mut text).unwrap();
+    text.split_whitespace().last().unwrap().to_owned()
+}
+
+/// A simulated robot that lives fast, and its line.
+fn robot() -> (Process, String) {
+    let mut robot = toposlam(&["robot", "--listen", "127.0.0.1:0", "--plan", "flat", "--speed", "50"])
+        .stdout(Stdio::piped())
+        .spawn()
+        .unwrap();
+    let line = address(robot.stdout.take().unwrap());
+    (Process(robot), line)
+}
+
+fn frames(file: &Path) -> (Vec<TimedFrame>, bool) {
+    let mut recording = Recording::open(file).unwrap();
+    let frames = recording.by_ref().map(Result::unwrap).collect();
+    (frames, recording.is_cut())
+}
+
+fn bytes(frames: &[TimedFrame]) -> Vec<u8> {
+    frames.iter().flat_map(|frame| frame.bytes.clone()).collect()
+}
+
+#[test]
+fn whoever_listens_to_a_recording_hears_the_bytes_of_the_robot() {
+    let directory = tempfile::tempdir().unwrap();
+    let [first, second] = ["first.mcap", "second.mcap"].map(|name| directory.path().join(name));
+    let (_robot, line) = robot();
+    let text = printed(&["record", &line, first.to_str().unwrap(), "--places", "4"]);
+    assert!(text.contains("4 places"), "{text}");
+
+    let mut play = toposlam(&["play", first.to_str().unwrap(), "--listen", "127.0.0.1:0", "--speed", "100"])
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()
+        .unwrap();
+    let line = address(play.stderr.take().unwrap());
+    printed(&["record", &line, second.to_str().unwrap()]);
+    let mut summary = String::new();
+    play.stdout.take().unwrap().read_to_string(&mut summary).unwrap();
+    assert!(play.wait().unwrap().success());
+
+    let (frames_of_first, is_cut) = frames(&first);
+    assert!(!is_cut && !frames(&second).1);
+    assert!(bytes(&frames_of_first) == bytes(&frames(&second).0));
+    assert_eq!(printed(&["play", first.to_str().unwrap()]), summary);
+    assert!(summary.contains("0 damaged") && summary.contains("map: "), "{summary}");
+
+    let raw = directory.path().join("raw");
+    printed(&["play", first.to_str().unwrap(), "--output", raw.to_str().unwrap(), "--fast"]);
+    assert!(std::fs::read(raw).unwrap() == bytes(&frames_of_first));
+    let again = toposlam(&["record", &line, first.to_str().unwrap()]).output().unwrap();
+    assert!(!again.status.success(), "a recording was overwritten, or a line found that is gone");
+    assert_eq!(frames(&first).0, frames_of_first);
+}
+
+#[cfg(unix)]
+#[test]
+fn ctrl_c_finishes_a_recording_and_a_kill_leaves_it_readable() {
+    let directory = tempfile::tempdir().unwrap();
+    let (_robot, line) = robot();
+    for (signal, is_finished) in [("-INT", true), ("-KILL", false)] {
+        let file = directory.path().join(format!("{signal}.mcap"));
+        let mut record = toposlam(&["record", &line, file.to_str().unwrap()]).stdout(Stdio::piped()).spawn().unwrap();
+        // A chunk is written when it is full; the head alone is shorter than this.
+        while !std::fs::metadata(&file).is_ok_and(|file| file.len() > 100_000) {
+            std::thread::sleep(std::time::Duration::from_millis(20));
+        }
+        assert!(Command::new("kill").args([signal, &record.id().to_string()]).status().unwrap().success());
+        assert_eq!(record.wait().unwrap().success(), is_finished);
+        let (frames, is_cut) = frames(&file);
+        assert_eq!(is_cut, !is_finished);
+        assert!(!frames.is_empty());
+    }
+}

@@ -1,0 +1,151 @@
+//! The paper's filter as a candidate, with the n-grams of its own history or of a prior.
+
+use super::{Candidate, Start, VERTICES};
+use crate::{
+    ancestry::Ancestry,
+    prior::{PriorSource, path_prior, table_prior},
+    settings::{EvaluationError, Filter, Settings},
+    trial::Trial,
+};
+use std::ptr;
+use toposlam::{Config, FaultKind, Fingerprint, Map, Observation, PaperFilter, Prior, VertexId};
+
+/// How many places a path can visit without a prior.
+pub(super) const MAX_PLACES: usize = 2048;
+
+pub(super) fn choose(particles: usize, settings: &Settings, ngrams: usize) -> Result<Start, EvaluationError> {
+    match particles {
+        0..=10 => with_particles::<10>(settings, ngrams),
+        11..=32 => with_particles::<32>(settings, ngrams),
+        _ => with_particles::<100>(settings, ngrams),
+    }
+}
+
+fn with_particles<const N: usize>(settings: &Settings, ngrams: usize) -> Result<Start, EvaluationError> {
+    if settings.prior == PriorSource::None {
+        // A word of history holds 32 places.
+        return match settings.longest() {
+            0..=256 => Ok(Online::<N, 8>::start),
+            257..=MAX_PLACES => Ok(Online::<N, 64>::start),
+            _ => Err(EvaluationError::PathTooLong { most: MAX_PLACES }),
+        };
+    }
+    // A word of a table holds 16 n-grams.
+    match ngrams {
+        0..=512 => Ok(Informed::<N, 32>::start),
+        513..=1024 => Ok(Informed::<N, 64>::start),
+        _ => Ok(Informed::<N, 512>::start),
+    }
+}
+
+/// The filter and the paths of its particles.
+struct Particles<const N: usize, const WORDS: usize> {
+    filter: Box<PaperFilter<N, VERTICES, WORDS>>,
+    ancestry: Ancestry,
+}
+
+impl<const N: usize, const WORDS: usize> Particles<N, WORDS> {
+    fn start(settings: &Settings, trial: &Trial) -> Self {
+        let mut filter = Box::new(PaperFilter::new());
+        let config = if let Filter::Paper(config) = settings.filter { config } else { Config::DEFAULT };
+        let started = filter.start(config, trial.filter_seed);
+        assert!(started.is_ok(), "the configuration was checked");
+        Self { filter, ancestry: Ancestry::new() }
+    }
+
+    fn advance(&mut self) {
+        let particles = self.filter.particles().iter();
+        self.ancestry.advance(particles.map(|particle| (particle.parent.into(), particle.at.into())));
+    }
+
+    /// The newest vertices that the best particle visited.
+    fn path(&self, places: usize) -> Vec<usize> {
+        let best = self.filter.best();
+        let index = self.filter.particles().iter().position(|particle| ptr::eq(particle, best));
+        let path = self.ancestry.path(index.unwrap_or(0));
+        path[path.len().saturating_sub(places)..].to_vec()
+    }
+}
+
+/// Without a prior: the n-grams are those of the path so far.
+struct Online<const N: usize, const WORDS: usize>(Particles<N, WORDS>);
+
+impl<const N: usize, const WORDS: usize> Online<N, WORDS> {
+    fn start(settings: &Settings, trial: &Trial) -> Box<dyn Candidate> {
+        Box::new(Self(Particles::start(settings, trial)))
+    }
+}
+
+impl<const N: usize, const WORDS: usize> Candidate for Online<N, WORDS> {
+    fn observe(&mut self, observation: Observation) {
+        self.0.filter.observe(observation.fingerprint);
+        self.0.advance();
+    }
+
+    fn polish(&mut self, _slices: u32) {}
+
+    fn search_from(&self, _path: &[VertexId], _slices: u32) -> Option<(Map<VERTICES>, Vec<usize>)> {
+        None
+    }
+
+    fn map(&self) -> Map<VERTICES> {
+        *self.0.filter.map()
+    }
+
+    fn path(&self, places: usize) -> Vec<usize> {
+        self.0.path(places)
+    }
+
+    fn vertices_full(&self) -> u32 {
+        self.0.filter.faults().count(FaultKind::VerticesFull)
+    }
+}
+
+/// With a prior. The filter then does not look at its own history, so the shortest will do.
+struct Informed<const N: usize, const WORDS: usize> {
+    particles: Particles<N, 1>,
+    prior: Box<Prior<VERTICES, WORDS>>,
+}
+
+impl<const N: usize, const WORDS: usize> Informed<N, WORDS> {
+    fn start(settings: &Settings, trial: &Trial) -> Box<dyn Candidate> {
+        Box::new(Self { particles: Particles::start(settings, trial), prior: prior(settings, trial) })
+    }
+}
+
+impl<const N: usize, const WORDS: usize> Candidate for Informed<N, WORDS> {
+    fn observe(&mut self, observation: Observation) {
+        self.particles.filter.observe_with_prior(observation.fingerprint, &mut self.prior);
+        self.particles.advance();
+    }
+
+    fn polish(&mut self, _slices: u32) {}
+
+    fn search_from(&self, _path: &[VertexId], _slices: u32) -> Option<(Map<VERTICES>, Vec<usize>)> {
+        None
+    }
+
+    fn map(&self) -> Map<VERTICES> {
+        *self.particles.filter.map()
+    }
+
+    fn path(&self, places: usize) -> Vec<usize> {
+        self.particles.path(places)
+    }
+
+    fn vertices_full(&self) -> u32 {
+        self.particles.filter.faults().count(FaultKind::VerticesFull)
+    }
+}
+
+/// The n-grams of a trial's prior as a table with room for them.
+pub(crate) fn prior<const WORDS: usize>(settings: &Settings, trial: &Trial) -> Box<Prior<VERTICES, WORDS>> {
+    let fingerprint = |visit: &crate::trial::Visit| visit.observation.fingerprint;
+    let prior = if settings.prior == PriorSource::Path {
+        path_prior(&trial.visits.iter().map(fingerprint).collect::<Vec<_>>(), settings.ngram_length)
+    } else {
+        let ngrams = trial.ngrams.iter().map(|ngram| ngram.iter().map(fingerprint).collect::<Vec<Fingerprint>>());
+        table_prior(ngrams, settings.ngram_length)
+    };
+    prior.unwrap_or_else(|_| unreachable!("the table was chosen to have room"))
+}

@@ -1,0 +1,84 @@
+//! The robust filter as a candidate.
+
+use super::{Candidate, Start, VERTICES};
+use crate::{
+    settings::{EvaluationError, Filter, Settings},
+    trial::Trial,
+};
+use toposlam::{FaultKind, Fingerprint, Map, Observation, RobustConfig, RobustFilter, VertexId};
+
+/// How many vertices a map of the robust filter can have.
+const ROBUST_VERTICES: usize = 32;
+/// How many places the n-grams of the prior and the path can have together.
+const MAX_HISTORY: usize = 16384;
+
+/// `places` is how many places the n-grams and the path have together.
+pub(super) fn choose(hypotheses: usize, places: usize) -> Result<Start, EvaluationError> {
+    match hypotheses {
+        0..=10 => with_hypotheses::<10>(places),
+        11..=32 => with_hypotheses::<32>(places),
+        _ => with_hypotheses::<100>(places),
+    }
+}
+
+fn with_hypotheses<const N: usize>(places: usize) -> Result<Start, EvaluationError> {
+    match places {
+        0..=512 => Ok(Robust::<N, 512>::start),
+        513..=4096 => Ok(Robust::<N, 4096>::start),
+        4097..=MAX_HISTORY => Ok(Robust::<N, MAX_HISTORY>::start),
+        _ => Err(EvaluationError::PathTooLong { most: MAX_HISTORY }),
+    }
+}
+
+struct Robust<const N: usize, const HISTORY: usize>(Box<RobustFilter<N, ROBUST_VERTICES, HISTORY>>);
+
+impl<const N: usize, const HISTORY: usize> Robust<N, HISTORY> {
+    fn start(settings: &Settings, trial: &Trial) -> Box<dyn Candidate> {
+        let mut filter = Box::new(RobustFilter::new());
+        let config = if let Filter::Robust(config) = settings.filter { config } else { RobustConfig::DEFAULT };
+        // Coarser fingerprints have wider steps.
+        let resolution_mm = Fingerprint::STEP_MM << Fingerprint::BITS.saturating_sub(settings.fingerprint_bits);
+        let config = RobustConfig { resolution_mm: resolution_mm.min(1000), ..config };
+        let started = filter.start(config, trial.filter_seed);
+        assert!(started.is_ok(), "the configuration was checked");
+        Box::new(Self(filter))
+    }
+}
+
+impl<const N: usize, const HISTORY: usize> Candidate for Robust<N, HISTORY> {
+    fn observe(&mut self, observation: Observation) {
+        self.0.observe(observation);
+    }
+
+    fn polish(&mut self, slices: u32) {
+        (0..slices).for_each(|_| self.0.polish());
+    }
+
+    fn search_from(&self, path: &[VertexId], slices: u32) -> Option<(Map<VERTICES>, Vec<usize>)> {
+        let mut search = Self(self.0.clone());
+        search.0.assume_path(path)?;
+        search.polish(slices);
+        search.0.refresh();
+        Some((search.map(), search.path(path.len())))
+    }
+
+    fn map(&self) -> Map<VERTICES> {
+        let best = self.0.map();
+        let mut map = Map::new();
+        for &label in best.labels() {
+            // The larger map has room for it.
+            let _ = map.add_vertex(label);
+        }
+        best.edges().for_each(|(a, b)| map.add_edge(a, b));
+        map
+    }
+
+    fn path(&self, places: usize) -> Vec<usize> {
+        let path: Vec<usize> = self.0.path().map(usize::from).collect();
+        path[path.len().saturating_sub(places)..].to_vec()
+    }
+
+    fn vertices_full(&self) -> u32 {
+        self.0.faults().count(FaultKind::VerticesFull)
+    }
+}

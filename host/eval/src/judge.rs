@@ -1,0 +1,285 @@
+//! One filter along one path, and how right its map is at each check point.
+
+use super::{
+    candidate::{Candidate, Start, VERTICES, prior_table},
+    graph::Graph,
+    prior::PriorSource,
+    score::{MapScore, is_localised, score_map_from},
+    settings::Settings,
+    trial::{Trial, Truth},
+};
+use std::time::{Duration, Instant};
+use toposlam::{Consistency, Direction, Evidence, History, Map, NgramLength, VertexId};
+
+/// Whether a map is exact is looked at after every so many places, and at the check points.
+pub const EXACT_EVERY: usize = 10;
+
+/// What one path contributes.
+#[derive(Clone, Debug, PartialEq)]
+pub struct PathResult {
+    /// Whether the path traverses every edge.
+    pub exhaustive: bool,
+    /// One for each check point.
+    pub judgements: Vec<Judgement>,
+    /// How often the filter wanted a vertex that its map had no room for.
+    pub vertices_full: u32,
+    /// How long the n-grams of the prior took to map.
+    pub prior_time: Duration,
+}
+
+/// How right a map is after some places of the path.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Judgement {
+    /// The score of the map.
+    pub score: MapScore,
+    /// How many vertices the map has.
+    pub vertices: usize,
+    /// The share of the places so far at which the best hypothesis of that moment knew where the robot was.
+    pub localised_share: f64,
+    /// The two-sided distance of Eq. 2, in millimetres; `u16::MAX` when it is infinite.
+    pub consistency_mm: u16,
+    /// The first place, counted from 1, from which on the map was exact up to now, as far as was looked at.
+    pub exact_from: Option<usize>,
+    /// Whether a long search that starts at the true path ends in another map, which then has the better score; `None` when
+    /// there was no search.
+    pub leaves_truth: Option<bool>,
+    /// How long the filter took for the places so far, polishing included.
+    pub filter_time: Duration,
+}
+
+/// Drives a filter along a path and judges it.
+pub fn judge(trial: &Trial, settings: &Settings, start: Start) -> PathResult {
+    let mut candidate = start(settings, trial);
+    let started = Instant::now();
+    for visit in trial.mapped_before().iter().flatten() {
+        candidate.observe(visit.observation);
+        candidate.polish(settings.polish_prior);
+    }
+    let prior_time = started.elapsed();
+
+    let before = trial.places_before();
+    let distance_mm = distance_mm(trial, settings);
+    let truths: Vec<Truth> = settings.lengths.iter().map(|&length| trial.truth(length)).collect();
+    let mut localised = vec![0; truths.len()];
+    let mut exact_from = None;
+    let mut filter_time = Duration::ZERO;
+    let mut judgements = Vec::new();
+    for (step, visit) in trial.visits.iter().enumerate() {
+        let start = Instant::now();
+        if step > 0 {
+            candidate.polish(settings.polish);
+        }
+        candidate.observe(visit.observation);
+        filter_time += start.elapsed();
+
+        let steps = step + 1;
+        let path = candidate.path(before + steps);
+        // The check points that are still ahead.
+        for (truth, localised) in truths.iter().zip(&mut localised).skip(judgements.len()) {
+            *localised += usize::from(is_localised(&path, &truth.classes[..before + steps]));
+        }
+        let check_point = (settings.lengths.get(judgements.len()) == Some(&steps)).then_some(judgements.len());
+        if check_point.is_none() && !steps.is_multiple_of(EXACT_EVERY) {
+            continue;
+        }
+        let map = candidate.map();
+        let graph = graph_of(&map);
+        let truth = trial.truth(steps);
+        let score = score_map_from(&graph, &path, &truth.graph, &truth.classes, before);
+        exact_from = score.exact.then(|| exact_from.unwrap_or(steps));
+        if let Some(check_point) = check_point {
+            judgements.push(Judgement {
+                score,
+                vertices: graph.vertex_count(),
+                localised_share: localised[check_point] as f64 / steps as f64,
+                consistency_mm: distance_mm(&map, steps),
+                exact_from,
+                leaves_truth: leaves_truth(&*candidate, &truth, before, settings.search_from_truth),
+                filter_time,
+            });
+        }
+    }
+    let vertices_full = candidate.vertices_full();
+    PathResult { exhaustive: trial.exhaustive, judgements, vertices_full, prior_time }
+}
+
+/// Whether a search of so many slices that starts at the true path ends in a map that is not the true one.
+fn leaves_truth(candidate: &dyn Candidate, truth: &Truth, before: usize, slices: u32) -> Option<bool> {
+    if slices == 0 {
+        return None;
+    }
+    // The filter numbers vertices by first visit.
+    let mut seen = Vec::new();
+    let path: Vec<VertexId> = truth
+        .classes
+        .iter()
+        .map(|class| {
+            let number = seen.iter().position(|known| known == class).unwrap_or_else(|| {
+                seen.push(*class);
+                seen.len() - 1
+            });
+            VertexId::new(u8::try_from(number).ok()?)
+        })
+        .collect::<Option<_>>()?;
+    let (map, path) = candidate.search_from(&path, slices)?;
+    Some(!score_map_from(&graph_of(&map), &path, &truth.graph, &truth.classes, before).exact)
+}
+
+fn graph_of(map: &Map<VERTICES>) -> Graph {
+    let edges = map.edges().map(|(a, b)| (usize::from(a), usize::from(b)));
+    Graph::from_edges(map.vertices().len(), edges)
+}
+
+/// The distance of a map after so many places of the path, in millimetres.
+type Distance<'a> = Box<dyn Fn(&Map<VERTICES>, usize) -> u16 + 'a>;
+
+/// The two-sided distance (Eq. 2) of a map from the n-grams of the prior, or, without one, from those of the first so
+/// many places of the path; in millimetres, whatever direction the filter takes.
+fn distance_mm<'a>(trial: &'a Trial, settings: &Settings) -> Distance<'a> {
+    let length = settings.ngram_length;
+    let ngrams = match settings.prior {
+        PriorSource::None if settings.longest() <= 256 => return from_history::<8>(trial, length),
+        PriorSource::None => return from_history::<64>(trial, length),
+        PriorSource::Path => super::prior::path_ngrams(length, settings.longest()),
+        PriorSource::Exploration => trial.ngrams.len(),
+    };
+    match ngrams {
+        0..=512 => from_prior::<32>(trial, settings),
+        513..=1024 => from_prior::<64>(trial, settings),
+        _ => from_prior::<512>(trial, settings),
+    }
+}
+
+fn from_history<'a, const WORDS: usize>(trial: &'a Trial, length: NgramLength) -> Distance<'a> {
+    Box::new(move |map, steps| {
+        let mut history = Box::new(History::<WORDS>::new());
+        for visit in &trial.visits[..steps] {
+            history.push(visit.observation.fingerprint);
+        }
+        two_sided_mm::<WORDS, 1>(map, &*history, length)
+    })
+}
+
+fn from_prior<const WORDS: usize>(trial: &Trial, settings: &Settings) -> Distance<'static> {
+    let (prior, length) = (prior_table::<WORDS>(settings, trial), settings.ngram_length);
+    Box::new(move |map, _| two_sided_mm::<WORDS, 7>(map, prior.ngrams(), length))
+}
+
+fn two_sided_mm<const WORDS: usize, const INDICES: usize>(
+    map: &Map<VERTICES>,
+    evidence: &impl Evidence<WORDS>,
+    length: NgramLength,
+) -> u16 {
+    let mut consistency = Box::new(Consistency::<VERTICES, WORDS, INDICES>::new());
+    let steps = consistency.distance_steps(map, evidence, length, Direction::TwoSided);
+    steps.map_or(u16::MAX, |steps| steps.saturating_mul(length.label_step_mm()))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{
+        candidate::Candidate,
+        environment::{Environment, Place},
+        settings::Filter,
+        walk::all_walks,
+    };
+    use toposlam::{Fingerprint, Observation, RobustConfig};
+
+    /// A candidate that has the whole environment as its map from the start, and knows where the robot is but for the
+    /// first so many places.
+    struct Oracle {
+        map: Map<VERTICES>,
+        places: Vec<usize>,
+        seen: usize,
+        lost_for: usize,
+    }
+
+    impl Candidate for Oracle {
+        fn observe(&mut self, _: Observation) {
+            self.seen += 1;
+        }
+
+        fn polish(&mut self, _slices: u32) {}
+
+        fn search_from(&self, _path: &[VertexId], _slices: u32) -> Option<(Map<VERTICES>, Vec<usize>)> {
+            None
+        }
+
+        fn map(&self) -> Map<VERTICES> {
+            self.map
+        }
+
+        fn path(&self, places: usize) -> Vec<usize> {
+            let vertex = |(step, &place)| if step < self.lost_for { (place + 1) % 3 } else { place };
+            let path: Vec<usize> = self.places[..self.seen].iter().enumerate().map(vertex).collect();
+            path[self.seen - places..].to_vec()
+        }
+
+        fn vertices_full(&self) -> u32 {
+            3
+        }
+    }
+
+    fn oracle<const LOST_FOR: usize>(_: &Settings, trial: &Trial) -> Box<dyn Candidate> {
+        let mut map = Map::new();
+        let radii = trial.environment.places().iter().map(|place| Fingerprint::from_radius_mm(place.mean_mm as u16));
+        let vertices: Vec<_> = radii.map(|radius| map.add_vertex(radius.unwrap()).unwrap()).collect();
+        trial.environment.graph().edges().iter().for_each(|&(a, b)| map.add_edge(vertices[a], vertices[b]));
+        let places = trial.mapped_before().iter().flatten().chain(&trial.visits).map(|visit| visit.place).collect();
+        Box::new(Oracle { map, places, seen: 0, lost_for: LOST_FOR })
+    }
+
+    fn triangle() -> Environment {
+        let places = [800.0, 1600.0, 2400.0].iter().zip(0..).map(|(&mean_mm, id)| Place { id, mean_mm, sd_mm: 0.0 });
+        Environment::new("triangle".into(), places.collect(), &[[0, 1], [1, 2], [2, 0]]).unwrap()
+    }
+
+    fn judged(prior: PriorSource, lengths: &[usize], start: Start) -> PathResult {
+        let environment = triangle();
+        let settings = Settings {
+            paths: 1,
+            lengths: lengths.to_vec(),
+            seed: 1,
+            filter: Filter::Robust(RobustConfig::DEFAULT),
+            prior,
+            polish: 0,
+            polish_prior: 0,
+            search_from_truth: 0,
+            hints: Default::default(),
+            fingerprint_bits: 12,
+            ngram_length: NgramLength::new(3).unwrap(),
+            threads: 1,
+        };
+        let walks = all_walks(&environment, 3, 100).unwrap();
+        judge(&Trial::draw(&environment, &walks, &settings, 0), &settings, start)
+    }
+
+    #[test]
+    fn the_whole_environment_is_exact_at_once_when_it_was_explored() {
+        let result = judged(PriorSource::Exploration, &[1, 4, 30], oracle::<0>);
+        assert_eq!(result.vertices_full, 3);
+        for (judgement, exact_from) in result.judgements.iter().zip([1, 1, 1]) {
+            let right = MapScore { exact: true, isomorphic: true, edge_f1: 1.0, location: 1.0 };
+            assert_eq!(judgement.score, right);
+            assert_eq!((judgement.vertices, judgement.localised_share), (3, 1.0));
+            assert_eq!((judgement.exact_from, judgement.consistency_mm), (Some(exact_from), 0));
+        }
+    }
+
+    #[test]
+    fn without_a_prior_a_map_is_judged_by_what_was_traversed() {
+        let result = judged(PriorSource::None, &[1, 30], oracle::<0>);
+        let [first, last] = [&result.judgements[0], &result.judgements[1]];
+        assert!(!first.score.exact && last.score.exact);
+        assert_eq!((first.exact_from, last.exact_from), (None, Some(10)));
+    }
+
+    #[test]
+    fn a_robot_that_was_lost_for_a_while_is_located_online_once_most_visits_are_right() {
+        let result = judged(PriorSource::None, &[12, 60], oracle::<4>);
+        let [first, last] = [&result.judgements[0], &result.judgements[1]];
+        assert_eq!(last.score.location, 56.0 / 60.0);
+        assert!(first.localised_share < last.localised_share && last.localised_share < 1.0);
+    }
+}

@@ -1,0 +1,195 @@
+//! Recorded ring ranges: a CSV file with a column for each sonar, and a TOML file that says where they look.
+
+use std::io::Read;
+
+use anyhow::{Context, bail, ensure};
+use serde::Deserialize;
+use toposlam::ring::{Echo, RingFrame, RingGeometry};
+use toposlam::{FaultCounters, FaultKind};
+
+/// The largest ring that is replayed. The sensors of a smaller one fill the first places, the others are dead.
+pub const SONARS_MAX: usize = 32;
+
+/// The description of a ring, as it stands in a TOML file.
+///
+/// ```
+/// let ring = toposlam_eval::recording::Ring::parse(
+///     r#"
+///     sonars = 4
+///     unit = "mm"
+///     max_range = 6000
+///     columns = ["front", "left", "back", "right"]
+///     bearings_deg = [0, 90, 180, -90]
+///     "#,
+/// )?;
+/// assert_eq!(ring.geometry().bearings_mrad[..4], [0, 1571, 3142, -1571]);
+/// # Ok::<(), anyhow::Error>(())
+/// ```
+#[derive(Clone, Debug, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Ring {
+    /// How many sonars the ring has, 3 to 32.
+    pub sonars: usize,
+    /// The unit of the ranges.
+    pub unit: Unit,
+    /// Ranges from this on mean that nothing was heard, in `unit`.
+    pub max_range: f64,
+    /// The CSV column of each sonar.
+    pub columns: Vec<String>,
+    /// The bearing of each sonar in degrees, counter-clockwise from straight ahead. Either this …
+    #[serde(default)]
+    pub bearings_deg: Vec<f64>,
+    /// … or the bearing of the first sonar …
+    #[serde(default)]
+    pub first_bearing_deg: f64,
+    /// … and the angle from each to the next, counter-clockwise positive.
+    #[serde(default)]
+    pub step_deg: f64,
+    /// Where the ranges are measured from: the distance of a sensor to the ring's centre, in `unit`.
+    #[serde(default)]
+    pub ring_radius: f64,
+}
+
+/// The unit of a recording's ranges.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Unit {
+    /// Metres.
+    M,
+    /// Centimetres.
+    Cm,
+    /// Millimetres.
+    Mm,
+}
+
+impl Unit {
+    /// One unit in millimetres.
+    pub const fn mm(self) -> f64 {
+        match self {
+            Self::M => 1000.0,
+            Self::Cm => 10.0,
+            Self::Mm => 1.0,
+        }
+    }
+}
+
+impl Ring {
+    /// Reads a ring's description.
+    ///
+    /// # Errors
+    /// What is missing, unknown or out of range.
+    pub fn parse(text: &str) -> anyhow::Result<Self> {
+        let mut ring: Self = toml::from_str(text).context("the ring's description")?;
+        ensure!((3..=SONARS_MAX).contains(&ring.sonars), "sonars must be 3 to {SONARS_MAX}, not {}", ring.sonars);
+        ensure!(ring.columns.len() == ring.sonars, "{} columns for {} sonars", ring.columns.len(), ring.sonars);
+        ensure!(ring.max_range > 0.0, "max_range must be above 0");
+        if ring.bearings_deg.is_empty() {
+            ensure!(ring.step_deg != 0.0, "either bearings_deg or step_deg must be given");
+            let bearing_deg = |sonar| ring.first_bearing_deg + ring.step_deg * sonar as f64;
+            ring.bearings_deg = (0..ring.sonars).map(bearing_deg).collect();
+        }
+        let bearings = ring.bearings_deg.len();
+        ensure!(bearings == ring.sonars, "{bearings} bearings for {} sonars", ring.sonars);
+        Ok(ring)
+    }
+
+    /// Where the sonars look.
+    pub fn geometry(&self) -> RingGeometry<SONARS_MAX> {
+        let mut geometry = RingGeometry { bearings_mrad: [0; SONARS_MAX] };
+        for (bearing_mrad, bearing_deg) in geometry.bearings_mrad.iter_mut().zip(&self.bearings_deg) {
+            let degrees = if *bearing_deg == 180.0 { 180.0 } else { (bearing_deg + 180.0).rem_euclid(360.0) - 180.0 };
+            *bearing_mrad = (degrees.to_radians() * 1000.0).round() as i16;
+        }
+        geometry
+    }
+
+    /// Reads the frames of a recording; columns that are not the ring's are ignored.
+    ///
+    /// An empty, negative or unreadable range is a dead sensor. A range of `max_range` or more, or infinite, is
+    /// silence.
+    ///
+    /// # Errors
+    /// When a column is missing, or a line is no CSV or has too few fields.
+    pub fn read(&self, csv_text: impl Read) -> anyhow::Result<Vec<RingFrame<SONARS_MAX>>> {
+        let mut reader = csv::ReaderBuilder::new().trim(csv::Trim::All).from_reader(csv_text);
+        let headers = reader.headers().context("the recording's header line")?.clone();
+        let mut places = Vec::new();
+        for column in &self.columns {
+            let Some(place) = headers.iter().position(|header| header == column) else {
+                let first = headers.get(0).unwrap_or("");
+                bail!("no column {column:?}: the first line must name the columns, and begins with {first:?}");
+            };
+            places.push(place);
+        }
+        let mut frames = Vec::new();
+        for record in reader.records() {
+            let record = record?;
+            let mut frame = RingFrame { echoes: [Echo::Dead; SONARS_MAX] };
+            for (echo, place) in frame.echoes.iter_mut().zip(&places) {
+                *echo = self.echo(record.get(*place).unwrap_or(""));
+            }
+            frames.push(frame);
+        }
+        Ok(frames)
+    }
+
+    fn echo(&self, field: &str) -> Echo {
+        match field.parse::<f64>() {
+            Ok(range) if range >= self.max_range => Echo::Silence,
+            Ok(range) if range >= 0.0 => {
+                let range_mm = ((range + self.ring_radius) * self.unit.mm()).round();
+                Echo::Range { range_mm: range_mm.min(f64::from(u16::MAX)) as u16 }
+            }
+            _ => Echo::Dead,
+        }
+    }
+}
+
+/// One line for each kind of fault that was seen.
+pub fn fault_lines(faults: &FaultCounters) -> Vec<String> {
+    let seen = FaultKind::ALL.into_iter().filter(|kind| faults.count(*kind) > 0);
+    seen.map(|kind| format!("{kind:?}: {}", faults.count(kind))).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const FOUR: &str =
+        "sonars = 4\nunit = \"cm\"\nmax_range = 600\ncolumns = [\"a\", \"b\", \"c\", \"d\"]\nstep_deg = 90\n";
+
+    #[test]
+    fn columns_are_found_by_name_and_ranges_scaled() {
+        let ring = Ring::parse(FOUR).unwrap();
+        let frames = ring.read("x,d,c,b,a\nfoo,1,2.5,600,\nbar,inf,-1,abc,9999".as_bytes()).unwrap();
+        assert_eq!(frames.len(), 2);
+        let range = |range_mm| Echo::Range { range_mm };
+        assert_eq!(frames[0].echoes[..5], [Echo::Dead, Echo::Silence, range(25), range(10), Echo::Dead]);
+        assert_eq!(frames[1].echoes[..4], [Echo::Silence, Echo::Dead, Echo::Dead, Echo::Silence]);
+    }
+
+    #[test]
+    fn a_recording_without_a_column_or_with_a_short_line_is_refused() {
+        let ring = Ring::parse(FOUR).unwrap();
+        assert!(ring.read("a,b,c\n1,2,3".as_bytes()).unwrap_err().to_string().contains("\"d\""));
+        assert!(ring.read("a,b,c,d\n1,2,3".as_bytes()).is_err());
+        let no_header = ring.read("0.438,2,3,4".as_bytes()).unwrap_err().to_string();
+        assert_eq!(no_header, "no column \"a\": the first line must name the columns, and begins with \"0.438\"");
+    }
+
+    #[test]
+    fn a_ring_that_contradicts_itself_is_refused() {
+        assert!(Ring::parse(&FOUR.replace("sonars = 4", "sonars = 5")).is_err());
+        assert!(Ring::parse(&FOUR.replace("sonars = 4", "sonars = 2")).is_err());
+        assert!(Ring::parse(&FOUR.replace("step_deg = 90", "")).is_err());
+        assert!(Ring::parse(&format!("{FOUR}bearings_deg = [1, 2]")).is_err());
+        assert!(Ring::parse(&format!("{FOUR}typo = 1")).is_err());
+    }
+
+    #[test]
+    fn the_shipped_ring_looks_clockwise_from_the_front() {
+        let ring = Ring::parse(include_str!("../rings/scitos-g5.toml")).unwrap();
+        let bearings_mrad = ring.geometry().bearings_mrad;
+        assert_eq!((bearings_mrad[0], bearings_mrad[6], bearings_mrad[23]), (0, -1571, 262));
+    }
+}

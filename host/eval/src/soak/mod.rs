@@ -1,0 +1,323 @@
+//! A long life in little time: a robot drives through a simulated building for hours, with faults on its ring and its line and an
+//! operator who tells it something all the time; everything is deterministic.
+//!
+//! What the robot says of its faults is held to what was done to it, see [`Account`].
+//!
+//! ```
+//! use toposlam_sim::injector::FaultRates;
+//! use toposlam_eval::soak::Soak;
+//! use toposlam_sim::world::{Plan, RobotModel};
+//!
+//! let plan = Plan::built_in("office").expect("it is built in");
+//! let soak = Soak { model: RobotModel::default(), rates: FaultRates::scaled(0.01), seed: 1, turns: 1000 };
+//! let life = soak.run(&plan)?;
+//! assert_eq!(life.watchdog_fed, 1000);
+//! assert_eq!(life.mistakes(), [""; 0]);
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+
+mod operator;
+
+use std::mem;
+
+use toposlam::reference::{SNAPSHOT_BYTES, SONARS};
+use toposlam::ring::{Echo, RingFrame};
+use toposlam::wire::{Command, Decoder, Inbox, Message, Outcome, Payload, Progress, Request};
+use toposlam::{FaultCounters, FaultKind};
+
+use crate::mapping::score_exploration;
+use crate::recording::fault_lines;
+use crate::score::MapScore;
+use operator::Operator;
+use toposlam_sim::exploration::Exploration;
+use toposlam_sim::injector::{FaultRates, LineCounts, LineInjector, RingCounts, RingInjector};
+use toposlam_sim::world::{Plan, RobotModel, VoronoiError};
+
+pub use operator::OperatorCounts;
+
+/// Turns of the robot's loop in a simulated hour.
+pub const TURNS_PER_HOUR: u64 = 36_000;
+
+/// How long a robot is to live, and what is to happen to it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Soak {
+    /// Its sonars and their noise.
+    pub model: RobotModel,
+    /// The faults.
+    pub rates: FaultRates,
+    /// The seed of the world and of the faults.
+    pub seed: u64,
+    /// Turns of its loop, ten in a second.
+    pub turns: u64,
+}
+
+/// What the robot must have counted, reckoned from what was done to it.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Account {
+    /// Lost answers.
+    pub sonar_silent: u64,
+    /// Sonars on a stuck bus.
+    pub bus_error: u64,
+    /// Ranges below what a sonar can measure, in frames that were mapped.
+    pub sonar_out_of_range: u64,
+    /// Mapped frames with too few live sonars.
+    pub ring_blind: u64,
+    /// What a decoder of the same bytes takes for no request.
+    pub wire_corrupt: u64,
+    /// Requests beyond one in a turn, and turns with too many bytes.
+    pub command_flood: u64,
+    /// Requests that the robot's replies refuse.
+    pub command_refused: u64,
+    /// Places beyond the room of the history; the filter counts its faults from the last restored snapshot on.
+    pub history_full: u64,
+}
+
+impl Account {
+    fn rows(&self) -> [(FaultKind, u64); 8] {
+        [
+            (FaultKind::SonarSilent, self.sonar_silent),
+            (FaultKind::BusError, self.bus_error),
+            (FaultKind::SonarOutOfRange, self.sonar_out_of_range),
+            (FaultKind::RingBlind, self.ring_blind),
+            (FaultKind::WireCorrupt, self.wire_corrupt),
+            (FaultKind::CommandFlood, self.command_flood),
+            (FaultKind::CommandRefused, self.command_refused),
+            (FaultKind::HistoryFull, self.history_full),
+        ]
+    }
+}
+
+/// What became of it.
+#[derive(Clone, Debug)]
+pub struct Life {
+    /// Turns of the robot's loop.
+    pub turns: u64,
+    /// How often the watchdog was fed.
+    pub watchdog_fed: u64,
+    /// Places that were reported.
+    pub places: u64,
+    /// Places that the filter has taken in.
+    pub observed: u64,
+    /// Places whose number was not the one after the last.
+    pub out_of_order: u64,
+    /// Snapshots that went to the flash.
+    pub kept: u64,
+    /// What was done to the ring.
+    pub ring: RingCounts,
+    /// What was done to the line, to the robot and from it.
+    pub lines: [LineCounts; 2],
+    /// What the operator did.
+    pub operator: OperatorCounts,
+    /// The faults that the robot has counted.
+    pub faults: FaultCounters,
+    /// Those that it must have counted.
+    pub account: Account,
+    /// How right the map is at the end.
+    pub score: MapScore,
+    /// Phantoms among the places.
+    pub phantoms: u64,
+    /// In how many frames a wall stopped the robot.
+    pub bumps: u32,
+}
+
+impl Soak {
+    /// Lets the robot live.
+    ///
+    /// # Errors
+    /// When the plan has no true map.
+    pub fn run(&self, plan: &Plan) -> Result<Life, VoronoiError> {
+        let mut buffer = [0; SNAPSHOT_BYTES];
+        let mut exploration = Exploration::start(plan, self.model, self.seed, &mut buffer)?;
+        let mut ring = RingInjector::new(self.rates, self.seed);
+        let mut lines = [0, 1].map(|line| LineInjector::new(self.rates, self.seed.wrapping_mul(2).wrapping_add(line)));
+        let mut operator = Operator::new();
+        let mut auditor = Auditor::default();
+        let mut out_of_order = 0;
+        let mut kept = 0;
+        let mut heard: Decoder = Decoder::new();
+        for turn in 0..self.turns {
+            let frame = exploration.frame();
+            let frame = ring.disturb(frame, exploration.ring_faults());
+            let told = operator.turn(turn, exploration.robot().mapper().map().vertices().len() as u8);
+            let mut arriving = lines[0].carry(&told);
+            arriving.extend(lines[0].noise());
+            auditor.arrive(&arriving);
+            exploration.board().received.extend(arriving);
+            let places = exploration.places() as u64;
+            if let Some((_, update)) = exploration.map(&frame) {
+                out_of_order += u64::from(u64::from(update.place_index) != places);
+            }
+            let sent = mem::take(&mut exploration.board().sent);
+            auditor.depart(&sent, &operator, exploration.places() as u64);
+            auditor.map(&frame);
+            each(&mut heard, &lines[1].carry(&sent), |message| {
+                if let Message::Reply(reply) = message {
+                    operator.hear(&reply, turn);
+                }
+            });
+            kept += u64::from(!mem::take(&mut exploration.board().kept).is_empty());
+            let velocity = exploration.board().velocity;
+            exploration.drive(velocity);
+        }
+        let places = exploration.places() as u64;
+        let observed = u64::from(exploration.robot().mapper().filter().observed());
+        let driver = *exploration.ring_faults();
+        let counted_from = auditor.restored_at.max(toposlam::reference::HISTORY as u64);
+        let account = Account {
+            sonar_silent: driver.count(FaultKind::SonarSilent).into(),
+            bus_error: driver.count(FaultKind::BusError).into(),
+            history_full: places.saturating_sub(counted_from),
+            ..auditor.account
+        };
+        Ok(Life {
+            turns: self.turns,
+            watchdog_fed: exploration.board().fed,
+            places,
+            observed,
+            out_of_order,
+            kept,
+            ring: ring.counts(),
+            lines: lines.map(|line| line.counts()),
+            operator: operator.counts(),
+            faults: exploration.faults(),
+            account,
+            score: score_exploration(&exploration),
+            phantoms: exploration.nodes().iter().filter(|node| node.is_none()).count() as u64,
+            bumps: exploration.rover().bumps(),
+        })
+    }
+}
+
+/// Keeps the account, with the robot's bytes and frames and nothing else of it.
+#[derive(Default)]
+struct Auditor {
+    account: Account,
+    arriving: Decoder<Request>,
+    departing: Decoder,
+    /// The number of the request that was answered last.
+    replied: Option<u16>,
+    is_paused: bool,
+    /// How many places there were when a snapshot was restored the last time.
+    restored_at: u64,
+}
+
+impl Auditor {
+    /// Bytes that the robot will find when its turn comes.
+    fn arrive(&mut self, bytes: &[u8]) {
+        let looked_at = usize::from(Inbox::BYTES_PER_TURN);
+        self.account.command_flood += u64::from(bytes.len() > looked_at);
+        let mut rest = &bytes[..bytes.len().min(looked_at)];
+        let mut waiting = None;
+        loop {
+            rest = match self.arriving.feed(rest) {
+                Progress::NeedsMore => return,
+                Progress::Error { rest, .. } => {
+                    self.account.wire_corrupt += 1;
+                    rest
+                }
+                Progress::Message { message, rest, .. } => {
+                    let first = *waiting.get_or_insert(message);
+                    self.account.command_flood += u64::from(first != message);
+                    rest
+                }
+            };
+        }
+    }
+
+    /// What the robot said in its turn, after so many places.
+    fn depart(&mut self, bytes: &[u8], operator: &Operator, places: u64) {
+        let Self { account, departing, replied, is_paused, restored_at, .. } = self;
+        each(departing, bytes, |message| {
+            let Message::Reply(reply) = message else { return };
+            // A request that came again is answered again, and not executed.
+            let is_executed = replied.replace(reply.request) != Some(reply.request);
+            account.command_refused += u64::from(is_executed && matches!(reply.outcome, Outcome::Refused(_)));
+            match operator.awaits(reply.request) {
+                Some(Command::Pause { on }) => *is_paused = on,
+                Some(Command::RestoreCommit) => *restored_at = places,
+                _ => {}
+            }
+        });
+    }
+
+    /// The frame of the turn. A command is executed before the frame is mapped.
+    fn map(&mut self, frame: &RingFrame<SONARS>) {
+        if self.is_paused {
+            return;
+        }
+        let place = toposlam::reference::PLACE;
+        let is_out_of_range = |echo: &&Echo| matches!(echo, Echo::Range { range_mm } if *range_mm < place.range_min_mm);
+        let out_of_range = frame.echoes.iter().filter(is_out_of_range).count();
+        let live = SONARS - out_of_range - frame.dead_sensors().count();
+        self.account.sonar_out_of_range += out_of_range as u64;
+        self.account.ring_blind += u64::from(live < usize::from(place.live_sensors_min));
+    }
+}
+
+/// Hands on every message among the bytes of a line.
+fn each<M: Payload>(decoder: &mut Decoder<M>, bytes: &[u8], mut take: impl FnMut(M)) {
+    let mut rest = bytes;
+    loop {
+        rest = match decoder.feed(rest) {
+            Progress::NeedsMore => return,
+            Progress::Error { rest, .. } => rest,
+            Progress::Message { message, rest, .. } => {
+                take(message);
+                rest
+            }
+        };
+    }
+}
+
+impl Life {
+    /// What must not have happened, in words; nothing when all is well.
+    pub fn mistakes(&self) -> Vec<String> {
+        let mut mistakes = Vec::new();
+        let mut hold = |holds: bool, mistake: String| {
+            if !holds {
+                mistakes.push(mistake);
+            }
+        };
+        let Self { turns, watchdog_fed, places, observed, out_of_order, .. } = self;
+        hold(watchdog_fed == turns, format!("the watchdog was fed {watchdog_fed} times in {turns} turns"));
+        hold(observed == places, format!("the filter has {observed} places, reported were {places}"));
+        hold(*out_of_order == 0, format!("{out_of_order} places had a number out of order"));
+        for (kind, expected) in self.account.rows() {
+            let counted = u64::from(self.faults.count(kind));
+            hold(counted == expected, format!("{kind:?} was counted {counted} times, not {expected}"));
+        }
+        for kind in [FaultKind::LoopLate, FaultKind::StoreFailed, FaultKind::SnapshotRejected, FaultKind::WireFull] {
+            hold(self.faults.count(kind) == 0, format!("{kind:?} was counted {} times", self.faults.count(kind)));
+        }
+        mistakes
+    }
+
+    /// All of it, a line for each subject.
+    pub fn lines(&self) -> Vec<String> {
+        let [to_robot, from_robot] = self.lines;
+        let OperatorCounts { answered, refused, repeated, restored } = self.operator;
+        let hours = self.turns as f64 / TURNS_PER_HOUR as f64;
+        let mut lines = vec![
+            format!("turns: {} ({hours:.1} simulated hours), watchdog fed {} times", self.turns, self.watchdog_fed),
+            format!("places: {} reported, {} in the filter, {} phantoms", self.places, self.observed, self.phantoms),
+            format!("ring: {}", self.ring),
+            format!("line to the robot: {to_robot}"),
+            format!("line from the robot: {from_robot}"),
+            format!(
+                "operator: {answered} requests answered, {refused} of them refused, {repeated} repetitions, \
+                 {restored} snapshots fetched and restored"
+            ),
+            format!("flash: {} snapshots kept", self.kept),
+            format!("stopped by a wall in {} turns", self.bumps),
+        ];
+        lines.extend(fault_lines(&self.faults).into_iter().map(|line| format!("fault {line}")));
+        lines.push(format!("fault LoopLate: {}", self.faults.count(FaultKind::LoopLate)));
+        lines.push(format!(
+            "against the true map: exact {}, edge F1 {:.2}, located in {:.0} % of the places that are remembered",
+            if self.score.exact { "yes" } else { "no" },
+            self.score.edge_f1,
+            100.0 * self.score.location
+        ));
+        lines
+    }
+}

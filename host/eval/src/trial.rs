@@ -1,0 +1,222 @@
+//! What happens on one path, and what is true about it: the same for every filter.
+
+use super::{
+    environment::Environment,
+    equivalence::SmallestEquivalent,
+    graph::Graph,
+    hints::Hint,
+    prior::PriorSource,
+    settings::{Filter, Settings},
+    walk::{Walk, draw_walk, observe, path_rng, quantise},
+};
+use rand::{Rng, seq::SliceRandom};
+use toposlam::{Fingerprint, Observation};
+
+/// A place that is visited, and what the robot tells of it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Visit {
+    /// The index of the place.
+    pub place: usize,
+    /// What the filter sees.
+    pub observation: Observation,
+}
+
+/// One path. Walk, readings and hints depend on the seed and the number of the path alone, whatever the filter and the
+/// prior are.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Trial<'a> {
+    /// Where the path is.
+    pub environment: &'a Environment,
+    /// Whether the path traverses every edge.
+    pub exhaustive: bool,
+    /// The path.
+    pub visits: Vec<Visit>,
+    /// What a filter that maps the prior sees before the path: n-grams in random order, each a sequence of its own.
+    pub ngrams: Vec<Vec<Visit>>,
+    /// The seed of the filter.
+    pub filter_seed: u64,
+    knows: Knowledge,
+}
+
+/// What of its environment a filter was shown, and can be judged by.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Knowledge {
+    /// The part that the path has traversed so far.
+    SoFar,
+    /// The part that the whole path traverses.
+    WholePath,
+    /// All of it.
+    Everything,
+}
+
+/// What a map should be.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Truth {
+    /// The smallest equivalent of what the filter was shown.
+    pub graph: Graph,
+    /// The vertex of the graph that the robot was at, for every place of the n-grams that are mapped, and of the path.
+    pub classes: Vec<usize>,
+}
+
+impl<'a> Trial<'a> {
+    /// Draws path number `number`. `explored` are the walks of the n-grams of an exploration; other priors need none.
+    pub fn draw(environment: &'a Environment, explored: &[Vec<usize>], settings: &Settings, number: u64) -> Self {
+        let mut rng = path_rng(settings.seed, number);
+        // Hints have their own stream, so that the readings are the same with and without them.
+        let mut hint_rng = rng.clone();
+        hint_rng.jump();
+        let Walk { places: walk, exhaustive } = draw_walk(environment, settings.longest(), &mut rng);
+        let mut read = |walk: &[usize], rng: &mut _| -> Vec<Visit> {
+            let fingerprints: Vec<_> = walk.iter().map(|&place| observe(&environment.places()[place], rng)).collect();
+            let hints = settings.hints.draw(environment, walk, &mut hint_rng);
+            let visit = |((&place, fingerprint), hint): ((&usize, Fingerprint), Hint)| {
+                let fingerprint = quantise(fingerprint, settings.fingerprint_bits);
+                let Hint { turn, degree } = hint;
+                Visit { place, observation: Observation { turn, degree, ..Observation::new(fingerprint) } }
+            };
+            begin(walk.iter().zip(fingerprints).zip(hints).map(visit).collect())
+        };
+        let visits = read(&walk, &mut rng);
+        let filter_seed = rng.next_u64();
+        let mut ngrams: Vec<Vec<Visit>> = match settings.prior {
+            PriorSource::None => Vec::new(),
+            PriorSource::Path => {
+                visits.windows(settings.ngram_length.get().into()).map(|window| begin(window.to_vec())).collect()
+            }
+            PriorSource::Exploration => explored.iter().map(|walk| read(walk, &mut rng)).collect(),
+        };
+        ngrams.shuffle(&mut rng);
+        let knows = match (settings.filter, settings.prior) {
+            // The map of the paper's filter grows with the path alone.
+            (Filter::Paper(_), _) | (Filter::Robust(_), PriorSource::None) => Knowledge::SoFar,
+            (Filter::Robust(_), PriorSource::Path) => Knowledge::WholePath,
+            (Filter::Robust(_), PriorSource::Exploration) => Knowledge::Everything,
+        };
+        Self { environment, exhaustive, visits, ngrams, filter_seed, knows }
+    }
+
+    /// The n-grams that the filter maps before the path.
+    pub fn mapped_before(&self) -> &[Vec<Visit>] {
+        if self.knows == Knowledge::SoFar { &[] } else { &self.ngrams }
+    }
+
+    /// How many places there are in [`Trial::mapped_before`].
+    pub fn places_before(&self) -> usize {
+        self.mapped_before().iter().map(Vec::len).sum()
+    }
+
+    /// The truth after the first `steps` places of the path.
+    pub fn truth(&self, steps: usize) -> Truth {
+        let walk: Vec<usize> = self.visits.iter().map(|visit| visit.place).collect();
+        let SmallestEquivalent { graph, class_of_place } = match self.knows {
+            Knowledge::SoFar => SmallestEquivalent::of_traversed(self.environment, &walk[..steps]),
+            Knowledge::WholePath => SmallestEquivalent::of_traversed(self.environment, &walk),
+            Knowledge::Everything => SmallestEquivalent::of_environment(self.environment),
+        };
+        let before = self.mapped_before().iter().flatten().map(|visit| visit.place);
+        let visited = before.chain(walk[..steps].iter().copied());
+        // What was shown to the filter contains what was visited.
+        let classes = visited.filter_map(|place| class_of_place[place]).collect();
+        Truth { graph, classes }
+    }
+}
+
+/// Visits as a sequence of their own: nothing is said of how the robot came to the first place, nor of turns before the
+/// third.
+fn begin(mut visits: Vec<Visit>) -> Vec<Visit> {
+    visits.iter_mut().take(2).for_each(|visit| visit.observation.turn = None);
+    visits.iter_mut().take(1).for_each(|visit| visit.observation.begins = true);
+    visits
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::walk::all_walks;
+    use std::path::Path;
+    use toposlam::{Config, NgramLength, RobustConfig};
+
+    fn environment() -> Environment {
+        Environment::load(&Path::new(env!("CARGO_MANIFEST_DIR")).join("environments/wean-surrogate-sd.toml")).unwrap()
+    }
+
+    fn settings(prior: PriorSource) -> Settings {
+        Settings {
+            paths: 1,
+            lengths: vec![12, 40],
+            seed: 5,
+            filter: Filter::Robust(RobustConfig::DEFAULT),
+            prior,
+            polish: 0,
+            polish_prior: 0,
+            search_from_truth: 0,
+            hints: "both".parse().unwrap(),
+            fingerprint_bits: 12,
+            ngram_length: NgramLength::new(5).unwrap(),
+            threads: 1,
+        }
+    }
+
+    #[test]
+    fn a_path_is_the_same_whatever_the_filter_prior_and_hints_are() {
+        let environment = environment();
+        let walks = all_walks(&environment, 5, 1000).unwrap();
+        let fingerprints = |settings: &Settings| {
+            let trial = Trial::draw(&environment, &walks, settings, 3);
+            let read =
+                trial.visits.iter().map(|visit| (visit.place, visit.observation.fingerprint)).collect::<Vec<_>>();
+            (read, trial.filter_seed)
+        };
+        let first = fingerprints(&settings(PriorSource::None));
+        assert_eq!(first.0.len(), 40);
+        for prior in [PriorSource::Path, PriorSource::Exploration] {
+            assert_eq!(fingerprints(&settings(prior)), first);
+            let paper =
+                Settings { filter: Filter::Paper(Config::DEFAULT), hints: "none".parse().unwrap(), ..settings(prior) };
+            assert_eq!(fingerprints(&paper), first);
+        }
+    }
+
+    #[test]
+    fn n_grams_are_sequences_of_their_own_in_another_order_on_each_path() {
+        let environment = environment();
+        let walks = all_walks(&environment, 5, 1000).unwrap();
+        for (prior, count) in [(PriorSource::None, 0), (PriorSource::Path, 36), (PriorSource::Exploration, 287)] {
+            let trial = Trial::draw(&environment, &walks, &settings(prior), 3);
+            assert_eq!((trial.mapped_before().len(), trial.places_before()), (count, 5 * count));
+            for sequence in trial.ngrams.iter().chain([&trial.visits]) {
+                let begins = sequence.iter().map(|visit| visit.observation.begins);
+                assert!(begins.eq((0..sequence.len()).map(|step| step == 0)));
+                let turns = sequence.iter().map(|visit| visit.observation.turn.is_some());
+                assert!(turns.eq((0..sequence.len()).map(|step| step >= 2)));
+            }
+            let places = |trial: &Trial| -> Vec<Vec<usize>> {
+                let walk = |ngram: &Vec<Visit>| ngram.iter().map(|visit| visit.place).collect();
+                trial.ngrams.iter().map(walk).collect()
+            };
+            let mut sorted = places(&trial);
+            sorted.sort();
+            if prior == PriorSource::Exploration {
+                assert_eq!(sorted, walks);
+                assert_ne!(places(&trial), places(&Trial::draw(&environment, &walks, &settings(prior), 4)));
+            }
+        }
+    }
+
+    #[test]
+    fn the_truth_is_what_the_filter_was_shown() {
+        let environment = environment();
+        let walks = all_walks(&environment, 5, 1000).unwrap();
+        let truth = |settings: &Settings| Trial::draw(&environment, &walks, settings, 3).truth(12);
+        let explored = truth(&settings(PriorSource::Exploration));
+        assert_eq!(&explored.graph, environment.graph());
+        assert_eq!(explored.classes.len(), 5 * 287 + 12);
+        let so_far = truth(&settings(PriorSource::None));
+        assert!(so_far.graph.edges().len() < environment.graph().edges().len());
+        assert_eq!(so_far.classes.len(), 12);
+        let paper = Settings { filter: Filter::Paper(Config::DEFAULT), ..settings(PriorSource::Exploration) };
+        assert_eq!(truth(&paper), so_far);
+        let whole_path = truth(&settings(PriorSource::Path));
+        assert!(whole_path.graph.edges().len() > so_far.graph.edges().len());
+    }
+}

@@ -1,0 +1,73 @@
+//! A robot lives for hours in a simulated building, with faults of every kind and an operator who never leaves it alone.
+
+use toposlam::FaultKind;
+use toposlam::drive::VelocityCommand;
+use toposlam::reference::SNAPSHOT_BYTES;
+use toposlam::ring::{Echo, RingFrame};
+use toposlam_eval::soak::{Life, Soak, TURNS_PER_HOUR};
+use toposlam_sim::exploration::Exploration;
+use toposlam_sim::injector::FaultRates;
+use toposlam_sim::world::{Plan, RobotModel};
+
+/// 24 hours take half a minute in release; `.ci/run` lets `toposlam soak` do them.
+const HOURS: u64 = 2;
+
+fn life(rates: FaultRates, hours: u64) -> Life {
+    let plan = Plan::built_in("office").unwrap();
+    let life = Soak { model: RobotModel::default(), rates, seed: 1, turns: hours * TURNS_PER_HOUR }.run(&plan).unwrap();
+    life.lines().iter().for_each(|line| println!("{line}"));
+    life
+}
+
+#[test]
+fn with_faults_no_turn_and_no_place_is_lost_and_every_fault_is_counted() {
+    let life = life(FaultRates::scaled(0.01), HOURS);
+    assert_eq!(life.mistakes(), [""; 0]);
+    assert!(life.places > 80 * HOURS, "{} places", life.places);
+    let [to_robot, from_robot] = life.lines;
+    assert!(life.ring.lost_answers > 0 && life.ring.corrupted_ranges > 0 && life.ring.delayed_frames > 0);
+    assert!(life.ring.stuck_times > 0 && to_robot.bursts > 0 && to_robot.floods > 0);
+    assert!(to_robot.dropped_bytes > 0 && to_robot.flipped_bits > 0 && from_robot.dropped_bytes > 0);
+    assert!(life.operator.restored >= HOURS && life.operator.repeated > 0 && life.kept > 0);
+    let counted = [FaultKind::RingBlind, FaultKind::WireCorrupt, FaultKind::CommandFlood, FaultKind::CommandRefused];
+    assert!(counted.into_iter().all(|kind| life.faults.count(kind) > 0), "{:?}", life.faults);
+}
+
+#[test]
+fn without_faults_an_operator_costs_the_robot_nothing() {
+    let life = life(FaultRates::NONE, 1);
+    assert_eq!(life.mistakes(), [""; 0]);
+    assert!(life.score.exact && life.phantoms == 0 && life.bumps == 0);
+    assert_eq!(life.operator.repeated, 0);
+}
+
+#[test]
+fn a_robot_whose_sonars_and_line_are_nearly_useless_still_turns_and_counts() {
+    let life = life(FaultRates::scaled(0.5), 1);
+    assert_eq!(life.mistakes(), [""; 0]);
+}
+
+#[test]
+fn the_same_life_twice_is_the_same() {
+    let [once, again] = [0, 1].map(|_| {
+        let life = life(FaultRates::scaled(0.02), 1);
+        (life.lines(), life.faults)
+    });
+    assert_eq!(once, again);
+}
+
+#[test]
+fn a_robot_that_hears_nothing_stands_and_goes_on_when_it_hears_again() {
+    let plan = Plan::built_in("office").unwrap();
+    let mut buffer = [0; SNAPSHOT_BYTES];
+    let mut exploration = Exploration::start(&plan, RobotModel::default(), 1, &mut buffer).unwrap();
+    while exploration.board().velocity.speed_permille < 900 {
+        exploration.advance();
+    }
+    for _ in 0..100 {
+        exploration.map(&RingFrame { echoes: [Echo::Dead; 16] });
+        assert_eq!(exploration.board().velocity, VelocityCommand::STOP);
+    }
+    exploration.advance();
+    assert!(exploration.board().velocity.speed_permille > 0);
+}

@@ -1,0 +1,261 @@
+//! A client of a robot: sends requests over its line until the replies come, and listens to everything else meanwhile.
+
+use std::{
+    fmt,
+    io::{self, Read, Write},
+    time::{Duration, Instant},
+};
+
+use toposlam::wire::{
+    CHUNK_BYTES, Chunk, Command, Encoder, Info, MAX_FRAME_BYTES, Message, Outcome, Picture, Refusal, Request, crc32,
+};
+
+use crate::listener::{Event, Listener};
+
+const BUFFER_BYTES: usize = 4096;
+
+/// A blocking client over any line. A read of the line should give up after some milliseconds when nothing comes.
+///
+/// A request whose reply does not come in time is sent again, which the robot executes once.
+/// All that is heard goes to the callback, replies included.
+///
+/// ```no_run
+/// use toposlam::wire::Command;
+/// use toposlam_link::{client::Client, line, wording};
+///
+/// let robot = line::open("tcp:127.0.0.1:7070", 115_200)?;
+/// let mut client = Client::new(robot, 1, |_, _| ());
+/// println!("{} vertices", client.map()?.vertices());
+/// println!("{}", wording::outcome(&client.request(Command::GoTo { vertex: 0 })?));
+/// std::fs::write("office.map", client.snapshot()?)?;
+/// # Ok::<(), anyhow::Error>(())
+/// ```
+pub struct Client<LINE, HEARD> {
+    line: LINE,
+    heard: HEARD,
+    encoder: Encoder,
+    listener: Listener,
+    next_id: u16,
+    /// How long a reply, or the whole map, is waited for; 1 s unless set.
+    pub timeout: Duration,
+    /// How often a request is sent before the client gives up; 5 unless set.
+    pub attempts: u32,
+}
+
+impl<LINE: Read + Write, HEARD: FnMut(&Listener, Event<'_>)> Client<LINE, HEARD> {
+    /// A client on a line. `first_id` should not be the number of the last request of the client before it: a random one is
+    /// good.
+    pub fn new(line: LINE, first_id: u16, heard: HEARD) -> Self {
+        Self {
+            line,
+            heard,
+            encoder: Encoder::default(),
+            listener: Listener::new(),
+            next_id: first_id,
+            timeout: Duration::from_secs(1),
+            attempts: 5,
+        }
+    }
+
+    /// What was heard so far.
+    pub const fn listener(&self) -> &Listener {
+        &self.listener
+    }
+
+    /// Goes on over another line after the one before was cut; what was heard stays.
+    pub fn reconnect(&mut self, line: LINE) {
+        self.line = line;
+        self.listener.reconnected(&mut self.heard);
+    }
+
+    /// Reads the line once and takes in what came, if anything.
+    ///
+    /// # Errors
+    /// When the line fails or ends.
+    pub fn listen(&mut self) -> Result<(), ClientError> {
+        self.await_reply(None).map(drop)
+    }
+
+    /// Sends a command and waits for what comes of it; a refusal is an outcome.
+    ///
+    /// # Errors
+    /// [`ClientError::NoReply`] after the last attempt, [`ClientError::Line`] when the line fails.
+    pub fn request(&mut self, command: Command) -> Result<Outcome, ClientError> {
+        let request = Request { id: self.next_id, command };
+        self.next_id = self.next_id.wrapping_add(1);
+        for _ in 0..self.attempts {
+            self.send(&request)?;
+            let deadline = Instant::now() + self.timeout;
+            while Instant::now() < deadline {
+                if let Some(outcome) = self.await_reply(Some(request.id))? {
+                    return Ok(outcome);
+                }
+            }
+        }
+        Err(ClientError::NoReply { attempts: self.attempts })
+    }
+
+    /// Sends a command that has no answer but that it is done.
+    ///
+    /// # Errors
+    /// As [`Client::request`], and [`ClientError::Refused`].
+    pub fn order(&mut self, command: Command) -> Result<(), ClientError> {
+        match self.request(command)? {
+            Outcome::Done => Ok(()),
+            other => Err(other.into()),
+        }
+    }
+
+    /// Asks which robot this is and what it does.
+    ///
+    /// # Errors
+    /// As [`Client::order`].
+    pub fn info(&mut self) -> Result<Info, ClientError> {
+        match self.request(Command::Info)? {
+            Outcome::Info(info) => Ok(info),
+            other => Err(other.into()),
+        }
+    }
+
+    /// Asks for the whole map and waits until it is here.
+    ///
+    /// # Errors
+    /// As [`Client::order`], and [`ClientError::NoMap`] when something of it was lost on the line each time.
+    pub fn map(&mut self) -> Result<&Picture<64>, ClientError> {
+        for _ in 0..self.attempts {
+            self.order(Command::GetMap)?;
+            let deadline = Instant::now() + self.timeout;
+            while Instant::now() < deadline {
+                self.listen()?;
+                let picture = self.listener.picture();
+                if picture.is_converged() && picture.is_complete() {
+                    return Ok(self.listener.picture());
+                }
+            }
+        }
+        Err(ClientError::NoMap)
+    }
+
+    /// Has the robot take a snapshot and fetches it.
+    ///
+    /// # Errors
+    /// As [`Client::order`].
+    pub fn snapshot(&mut self) -> Result<Vec<u8>, ClientError> {
+        let mut snapshot = Vec::new();
+        loop {
+            let offset = snapshot.len() as u16;
+            match self.request(Command::GetSnapshot { offset })? {
+                Outcome::Snapshot { total, offset: from, bytes } if from == offset => {
+                    snapshot.extend(bytes.as_slice());
+                    if snapshot.len() >= total.into() || bytes.as_slice().is_empty() {
+                        return Ok(snapshot);
+                    }
+                }
+                other => return Err(other.into()),
+            }
+        }
+    }
+
+    /// Sends a snapshot and has the robot go on with its map.
+    ///
+    /// # Errors
+    /// As [`Client::order`]; the robot then goes on as it was.
+    pub fn restore(&mut self, snapshot: &[u8]) -> Result<(), ClientError> {
+        let length = u16::try_from(snapshot.len()).map_err(|_| ClientError::Refused(Refusal::TooLong))?;
+        self.order(Command::RestoreBegin { length, crc: crc32(snapshot) })?;
+        for (offset, bytes) in (0..=length).step_by(CHUNK_BYTES).zip(snapshot.chunks(CHUNK_BYTES)) {
+            self.order(Command::RestoreChunk { offset, bytes: Chunk::new(bytes.iter().copied()) })?;
+        }
+        self.order(Command::RestoreCommit)
+    }
+
+    /// Sends a zero before the frame, so that noise before it does not spoil it.
+    fn send(&mut self, request: &Request) -> Result<(), ClientError> {
+        let mut buffer = [0; MAX_FRAME_BYTES + 1];
+        let (_, frame) = buffer.split_at_mut(1);
+        let length = self.encoder.encode(request, frame).map_err(io::Error::other)?.len();
+        self.line.write_all(&buffer[..=length])?;
+        self.line.flush()?;
+        Ok(())
+    }
+
+    /// Reads once and takes in what came; gives the outcome of the request with a number if that is among it.
+    fn await_reply(&mut self, id: Option<u16>) -> Result<Option<Outcome>, ClientError> {
+        let mut buffer = [0; BUFFER_BYTES];
+        let count = match self.line.read(&mut buffer) {
+            Ok(0) => return Err(ClientError::Line(io::ErrorKind::UnexpectedEof.into())),
+            Ok(count) => count,
+            Err(error) if is_pause(&error) => 0,
+            Err(error) => return Err(error.into()),
+        };
+        let mut outcome = None;
+        let heard = &mut self.heard;
+        self.listener.feed(&buffer[..count], |listener, event| {
+            if let Event::Message(_, Message::Reply(reply)) = event
+                && Some(reply.request) == id
+            {
+                outcome = Some(reply.outcome);
+            }
+            heard(listener, event);
+        });
+        Ok(outcome)
+    }
+}
+
+fn is_pause(error: &io::Error) -> bool {
+    matches!(error.kind(), io::ErrorKind::WouldBlock | io::ErrorKind::TimedOut | io::ErrorKind::Interrupted)
+}
+
+/// Why a robot did not do what it was told.
+#[derive(Debug)]
+pub enum ClientError {
+    /// The line failed.
+    Line(io::Error),
+    /// No reply came.
+    NoReply {
+        /// How often the request was sent.
+        attempts: u32,
+    },
+    /// The robot refused.
+    Refused(Refusal),
+    /// The robot answered something else than was asked for.
+    OutOfPlace(Box<Outcome>),
+    /// The robot took the command, but its map did not arrive whole.
+    NoMap,
+}
+
+impl From<io::Error> for ClientError {
+    fn from(error: io::Error) -> Self {
+        Self::Line(error)
+    }
+}
+
+/// An outcome that is not the one that was asked for.
+impl From<Outcome> for ClientError {
+    fn from(outcome: Outcome) -> Self {
+        match outcome {
+            Outcome::Refused(refusal) => Self::Refused(refusal),
+            other => Self::OutOfPlace(Box::new(other)),
+        }
+    }
+}
+
+impl fmt::Display for ClientError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Line(_) => f.write_str("the line to the robot failed"),
+            Self::NoReply { attempts } => {
+                write!(f, "the robot did not answer {attempts} requests: it is not there, or does not know the command")
+            }
+            Self::Refused(refusal) => write!(f, "the robot refused: {refusal}"),
+            Self::OutOfPlace(outcome) => write!(f, "the robot answered something else: {outcome:?}"),
+            Self::NoMap => f.write_str("the map did not arrive whole"),
+        }
+    }
+}
+
+impl std::error::Error for ClientError {
+    fn source(&self) -> Option<&(dyn std::error::Error + 'static)> {
+        if let Self::Line(error) = self { Some(error) } else { None }
+    }
+}

@@ -1,0 +1,89 @@
+//! Events as JSON, one object each, for scripts, browsers and brokers.
+//!
+//! ```
+//! use toposlam::wire::{Arrival, Header, Message};
+//! use toposlam_link::{json, listener::Event};
+//!
+//! let header = Header { sequence: 7, arrival: Arrival::First };
+//! let event = json::event(Event::Message(header, &Message::Edge { a: 0, b: 1, present: true }));
+//! assert_eq!(event.to_string(), r#"{"a":0,"b":1,"event":"Edge","present":true,"sequence":7}"#);
+//! ```
+
+use serde_json::{Map, Value, json};
+use toposlam::ring::Echo;
+use toposlam::wire::{Arrival, Echoes, Message};
+
+use crate::listener::Event;
+
+/// One event: `event` is the name of the message, or `Damaged`; the message's fields stand beside it under their names.
+/// `lost` is there when frames are missing before it.
+pub fn event(event: Event<'_>) -> Value {
+    let (header, message) = match event {
+        Event::Damaged(error) => return json!({"event": "Damaged", "error": error.to_string()}),
+        Event::Message(header, message) => (header, message),
+    };
+    let mut object = match message {
+        Message::Ring { frame_index, echoes } => {
+            object("Ring", json!({"frame_index": frame_index, "ranges_mm": ranges_mm(echoes)}))
+        }
+        _ => match serde_json::to_value(message) {
+            Ok(Value::Object(variant)) => {
+                variant.into_iter().next().map_or_else(Map::new, |(name, fields)| object(&name, fields))
+            }
+            _ => Map::new(),
+        },
+    };
+    object.insert("sequence".to_owned(), header.sequence.into());
+    if let Arrival::AfterGap { lost } = header.arrival {
+        object.insert("lost".to_owned(), lost.into());
+    }
+    Value::Object(object)
+}
+
+/// The range of each sonar in millimetres, `"silence"` or `"dead"`.
+pub fn ranges_mm(echoes: &Echoes) -> Value {
+    let range = |echo| match echo {
+        Echo::Range { range_mm } => range_mm.into(),
+        Echo::Silence => "silence".into(),
+        Echo::Dead => "dead".into(),
+    };
+    echoes.iter().map(range).collect::<Vec<Value>>().into()
+}
+
+fn object(name: &str, fields: Value) -> Map<String, Value> {
+    let mut object = match fields {
+        Value::Object(fields) => fields,
+        other => Map::from_iter([("value".to_owned(), other)]),
+    };
+    object.insert("event".to_owned(), name.into());
+    object
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use toposlam::wire::{Belief, DecodeError, Header, List, PlaceProbability};
+
+    #[test]
+    fn an_event_tells_what_was_lost_or_damaged() {
+        let header = Header { sequence: 9, arrival: Arrival::AfterGap { lost: 3 } };
+        let echoes = Echoes::new(&[Echo::Dead, Echo::Silence, Echo::Range { range_mm: 5 }]);
+        let ring = event(Event::Message(header, &Message::Ring { frame_index: 1, echoes }));
+        assert_eq!(
+            ring,
+            json!({"event": "Ring", "frame_index": 1, "ranges_mm": ["dead", "silence", 5], "sequence": 9, "lost": 3})
+        );
+        assert_eq!(event(Event::Damaged(DecodeError::Cut))["event"], "Damaged");
+    }
+
+    #[test]
+    fn lists_and_options_are_plain_json() {
+        let header = Header { sequence: 0, arrival: Arrival::InOrder };
+        let places = List::new([PlaceProbability { vertex: 2, permille: 900 }]);
+        let belief =
+            event(Event::Message(header, &Message::Belief(Belief { place_index: 4, map_permille: 1000, places })));
+        assert_eq!(belief["places"], json!([{"vertex": 2, "permille": 900}]));
+        let place = Message::Place { place_index: 1, frame_index: 2, radius_mm: 3, degree: None };
+        assert_eq!(event(Event::Message(header, &place))["degree"], Value::Null);
+    }
+}

@@ -1,0 +1,72 @@
+//! The picture of a map that a robot makes, update by update.
+
+use toposlam::reference::SNAPSHOT_BYTES;
+use toposlam::wire::Message;
+
+use super::{Layout, conflicts, graph::Graph, triangulation::Triangulation};
+use crate::listener::{Event, Listener};
+use toposlam_sim::exploration::Exploration;
+use toposlam_sim::world::{Plan, RobotModel};
+
+const RUNS: u64 = 6;
+const PLACES: usize = 50;
+
+/// What became of the picture in all runs.
+#[derive(Debug, Default)]
+struct Tally {
+    updates: usize,
+    /// Updates in which a vertex that had a position moved.
+    moved: usize,
+    vertices_moved: usize,
+    /// Updates to maps that cannot be drawn without crossings.
+    not_planar: usize,
+    farthest: f64,
+}
+
+impl Tally {
+    /// Takes in the map as heard now.
+    fn arrange(&mut self, layout: &mut Layout, listener: &Listener) {
+        let map = listener.map();
+        let before = layout.points().to_vec();
+        let graph_before = layout.graph.clone();
+        layout.arrange(&map);
+        let graph = Graph::of(&map);
+        if graph == graph_before {
+            assert_eq!(before, layout.points(), "nothing has changed");
+            return;
+        }
+        self.updates += 1;
+        if graph.vertices() < 3 || Triangulation::of(&graph).is_some() {
+            assert_eq!(conflicts::conflicts(&graph, layout.points()), 0, "{map:?}");
+        } else {
+            self.not_planar += 1;
+        }
+        let moves = before.iter().zip(layout.points()).filter(|(before, now)| before.is_known() && before != now);
+        let lengths: Vec<f64> = moves.map(|(before, now)| (*now - *before).length()).collect();
+        self.moved += usize::from(!lengths.is_empty());
+        self.vertices_moved += lengths.len();
+        self.farthest = lengths.into_iter().fold(self.farthest, f64::max);
+    }
+}
+
+#[test]
+fn the_picture_of_an_exploration_mostly_stands_still() {
+    let plan = Plan::built_in("office").unwrap();
+    let mut tally = Tally::default();
+    for seed in 1..=RUNS {
+        let mut buffer = [0; SNAPSHOT_BYTES];
+        let mut exploration = Exploration::start(&plan, RobotModel::default(), seed, &mut buffer).unwrap();
+        let (mut listener, mut layout) = (Listener::new(), Layout::new());
+        while exploration.places() < PLACES {
+            exploration.advance();
+            listener.feed(&exploration.board().sent, |listener, event| match event {
+                Event::Message(header, message @ Message::Renamed(_)) => layout.hear(header, message),
+                // With this all of an update is heard.
+                Event::Message(_, Message::Map { .. }) => tally.arrange(&mut layout, listener),
+                Event::Message(..) | Event::Damaged(_) => {}
+            });
+        }
+    }
+    println!("{RUNS} explorations of the office, {PLACES} places each: {tally:?}");
+    assert!(tally.updates > 60 && 5 * tally.moved < tally.updates, "{tally:?}");
+}

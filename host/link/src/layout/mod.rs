@@ -1,0 +1,146 @@
+//! Where to draw the vertices of a map that has no positions: a picture that does not jump from one update to the next.
+//!
+//! No edges cross where the graph allows that, and no vertex lies on another or on an edge of others. A vertex keeps its
+//! position as long as that is so; a new one goes beside its neighbours.
+//!
+//! ```
+//! use toposlam_link::layout::Layout;
+//! use toposlam_link::topology::{TopologicalMap, Vertex};
+//!
+//! let mut layout = Layout::new();
+//! layout.arrange(&TopologicalMap { vertices: vec![Vertex::default(); 3], edges: vec![(0, 1), (1, 2)] });
+//! let before = layout.points().to_vec();
+//! layout.arrange(&TopologicalMap { vertices: vec![Vertex::default(); 4], edges: vec![(0, 1), (0, 3), (1, 2), (2, 3)] });
+//! assert_eq!(layout.points()[..3], before);
+//! ```
+
+mod barycentres;
+mod comfort;
+mod conflicts;
+mod drawing;
+mod embedding;
+mod geometry;
+mod graph;
+mod placement;
+mod redrawing;
+mod reduction;
+mod smoothing;
+mod triangulation;
+mod untangling;
+
+use toposlam::wire::{Arrival, Header, Message, Renamed};
+
+use self::graph::Graph;
+use crate::topology::TopologicalMap;
+
+/// A position in the picture; an edge is about 1 long. `y` points up.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Point {
+    /// To the right.
+    pub x: f64,
+    /// Up.
+    pub y: f64,
+}
+
+/// Positions for the vertices of a map that grows.
+///
+/// The same maps in the same order give the same picture.
+#[derive(Clone, Debug, Default)]
+pub struct Layout {
+    graph: Graph,
+    points: Vec<Point>,
+}
+
+impl Layout {
+    /// An empty picture.
+    pub fn new() -> Self {
+        Self::default()
+    }
+
+    /// Gives every vertex of the map a position; those that have one keep it as far as possible.
+    ///
+    /// Edges of a map that is planar do not cross. Any two vertices are 0.35 apart or more, and a vertex is 0.12 or more from an edge
+    /// that does not end at it; on a map that is not planar both as far as possible. Self-loops and labels play no part.
+    /// Cost: nothing to speak of when the graph is the one before.
+    pub fn arrange(&mut self, map: &TopologicalMap) {
+        let graph = Graph::of(map);
+        if graph == self.graph && self.points.iter().all(|point| point.is_known()) {
+            return;
+        }
+        self.graph = graph;
+        self.points.resize(self.graph.vertices(), Point::UNKNOWN);
+        let before = self.points.clone();
+        let is_blank = !before.iter().any(|point| point.is_known());
+        if is_blank && before.len() > 2 {
+            self.points = redrawing::redraw(&self.graph, &before);
+            return;
+        }
+        self.place_new();
+        let left = untangling::untangle(&self.graph, &mut self.points);
+        if left == 0 {
+            return;
+        }
+        let points = redrawing::redraw(&self.graph, &before);
+        let redrawn = conflicts::conflicts(&self.graph, &points);
+        // Where crossings cannot be helped, a few less do not make up for a picture that jumps.
+        let is_worth_it = redrawn == 0 || 2 * redrawn < left || left > conflicts::crossings(&self.graph, &self.points);
+        if redrawn < left && is_worth_it {
+            self.points = points;
+        }
+    }
+
+    /// Takes in what a message tells of the numbers of the vertices: that they are others now, or that the robot has started anew and
+    /// so has the picture.
+    pub fn hear(&mut self, header: Header, message: &Message) {
+        match header.arrival {
+            Arrival::Late => return,
+            Arrival::Restart => *self = Self::new(),
+            Arrival::First | Arrival::InOrder | Arrival::AfterGap { .. } => {}
+        }
+        if let Message::Renamed(renamed) = message {
+            self.rename(renamed);
+        }
+    }
+
+    /// The robot has given its vertices new numbers: each keeps its position under the new one.
+    ///
+    /// Of vertices that are one now, the first one's position stays. [`Layout::arrange`] is to follow: until then a vertex without
+    /// a position is at NaN.
+    pub fn rename(&mut self, renamed: &Renamed) {
+        let mut points = Vec::new();
+        for (before, &point) in (0..=u8::MAX).zip(&self.points) {
+            let Some(now) = renamed.now(before).map(usize::from) else { continue };
+            if now >= points.len() {
+                points.resize(now + 1, Point::UNKNOWN);
+            }
+            if !points[now].is_known() {
+                points[now] = point;
+            }
+        }
+        self.points = points;
+        self.graph = Graph::default();
+    }
+
+    /// The position of every vertex.
+    pub fn points(&self) -> &[Point] {
+        &self.points
+    }
+
+    /// Places the vertices that have no position, those with most neighbours in the picture first.
+    fn place_new(&mut self) {
+        loop {
+            let graph = &self.graph;
+            let known = |vertex: usize| {
+                graph.neighbours(vertex).iter().filter(|&&neighbour| self.points[neighbour].is_known()).count()
+            };
+            let waiting = (0..self.points.len()).rev().filter(|&vertex| !self.points[vertex].is_known());
+            let Some(vertex) = waiting.max_by_key(|&vertex| known(vertex)) else { break };
+            self.points[vertex] = placement::place(graph, &self.points, vertex);
+        }
+    }
+}
+
+#[cfg(test)]
+mod exploration_tests;
+#[cfg(test)]
+mod tests;

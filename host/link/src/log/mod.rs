@@ -1,0 +1,49 @@
+//! Recordings of a robot's line as MCAP files, which Foxglove and Rerun open and from which everything can be heard again.
+//!
+//! A recording holds every byte as it came, damaged ones too, each frame with the time of its arrival. Beside that it
+//! holds what was understood meanwhile, in the messages that viewers know; `docs/recording.md` lists the topics.
+//!
+//! ```
+//! use toposlam::wire::{Encoder, MAX_FRAME_BYTES, Message};
+//! use toposlam_link::{listener::Listener, log::{Recorder, Recording}};
+//!
+//! let mut buffer = [0; MAX_FRAME_BYTES];
+//! let edge = Encoder::new(0).encode(&Message::Edge { a: 0, b: 1, present: true }, &mut buffer)?;
+//!
+//! let mut file = Vec::new();
+//! let mut recorder = Recorder::new(&mut file)?;
+//! recorder.hear(edge, 1_000_000_000)?;
+//! recorder.finish()?;
+//!
+//! let mut listener = Listener::new();
+//! for frame in Recording::new(&file[..]) {
+//!     listener.feed(&frame?.bytes, |_, _| ());
+//! }
+//! assert_eq!(listener.map().edges, [(0, 1)]);
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+
+mod error;
+mod recorder;
+mod recording;
+mod scene;
+#[cfg(test)]
+mod tests;
+mod topics;
+
+use std::path::Path;
+
+pub use error::LogError;
+pub use recorder::{Recorder, Summary};
+pub use recording::{Recording, TimedFrame};
+pub use scene::{MAP_FRAME, METRES_PER_EDGE, ROBOT_FRAME};
+pub use topics::Topic;
+
+/// The bytes of every frame of a recording, in the order in which they came; one after the other they are what the line
+/// brought.
+///
+/// # Errors
+/// When the file cannot be opened; then each item as [`Recording`]'s.
+pub fn frames(path: &Path) -> Result<impl Iterator<Item = Result<Vec<u8>, LogError>> + use<>, LogError> {
+    Ok(Recording::open(path)?.map(|frame| frame.map(|frame| frame.bytes)))
+}

@@ -1,0 +1,128 @@
+//! A topological map as plain data, of whoever made it: a robot at the other end of a line, or the library on this computer.
+//!
+//! ```
+//! use petgraph::algo::connected_components;
+//! use toposlam::{Fingerprint, Map};
+//! use toposlam_link::topology::TopologicalMap;
+//!
+//! let mut map: Map<8> = Map::new();
+//! let hall = map.add_vertex(Fingerprint::from_radius_mm(1200)?)?;
+//! let door = map.add_vertex(Fingerprint::from_radius_mm(400)?)?;
+//! map.add_edge(hall, door);
+//!
+//! let topology = TopologicalMap::from(&map);
+//! assert_eq!(topology.edges, [(0, 1)]);
+//! assert_eq!(topology.vertices[1].radius_mm, 400);
+//! assert_eq!(connected_components(&topology.to_petgraph()), 1);
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+
+use petgraph::graph::UnGraph;
+use toposlam::wire::{Picture, crc32};
+use toposlam::{Map, VertexId};
+
+/// The vertices of a map and the edges between them.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Hash)]
+pub struct TopologicalMap {
+    /// Vertex 0, 1, … with their labels.
+    pub vertices: Vec<Vertex>,
+    /// Every edge once, the smaller vertex first, in ascending order; equal ends are a self-loop.
+    pub edges: Vec<(u8, u8)>,
+}
+
+/// One vertex, with its label.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+pub struct Vertex {
+    /// The mean radius observed there, in millimetres; 0 while it was not heard.
+    pub radius_mm: u16,
+    /// How many observations the mean is made of; 0 while that was not heard.
+    pub visits: u32,
+}
+
+impl TopologicalMap {
+    /// The same as a graph of `petgraph`, whose node `n` is vertex `n`.
+    pub fn to_petgraph(&self) -> UnGraph<Vertex, ()> {
+        let mut graph = UnGraph::with_capacity(self.vertices.len(), self.edges.len());
+        let nodes: Vec<_> = self.vertices.iter().map(|vertex| graph.add_node(*vertex)).collect();
+        for &(a, b) in &self.edges {
+            graph.add_edge(nodes[usize::from(a)], nodes[usize::from(b)], ());
+        }
+        graph
+    }
+
+    /// The number by which a robot names this map, see [`toposlam::wire::map_digest`].
+    pub fn digest(&self) -> u32 {
+        let mut bytes = vec![self.vertices.len() as u8];
+        for (label, neighbours) in self.vertices.iter().zip(self.neighbours()) {
+            let row = neighbours.iter().fold(0_u64, |row, vertex| row | 1 << vertex);
+            bytes.extend(label.radius_mm.to_le_bytes());
+            bytes.extend(label.visits.to_le_bytes());
+            bytes.extend(row.to_le_bytes());
+        }
+        crc32(&bytes)
+    }
+
+    /// For every vertex its neighbours in ascending order; a vertex with a self-loop is its own neighbour.
+    pub fn neighbours(&self) -> Vec<Vec<usize>> {
+        let mut neighbours = vec![Vec::new(); self.vertices.len()];
+        for &(a, b) in &self.edges {
+            let (a, b) = (usize::from(a), usize::from(b));
+            neighbours[a].push(b);
+            if a != b {
+                neighbours[b].push(a);
+            }
+        }
+        for list in &mut neighbours {
+            list.sort_unstable();
+        }
+        neighbours
+    }
+}
+
+/// The map as heard so far.
+impl<const V: usize> From<&Picture<V>> for TopologicalMap {
+    fn from(picture: &Picture<V>) -> Self {
+        let label = |vertex| {
+            picture.row(vertex).map_or(Vertex::default(), |row| Vertex { radius_mm: row.radius_mm, visits: row.visits })
+        };
+        Self { vertices: (0..picture.vertices()).map(label).collect(), edges: picture.edges().collect() }
+    }
+}
+
+impl<const V: usize> From<&Map<V>> for TopologicalMap {
+    fn from(map: &Map<V>) -> Self {
+        let label = |(vertex, label): (VertexId, &toposlam::Fingerprint)| Vertex {
+            radius_mm: label.radius_mm(),
+            visits: map.visits(vertex),
+        };
+        let edges = map.edges().map(|(a, b)| (a.into(), b.into()));
+        Self { vertices: map.vertices().zip(map.labels()).map(label).collect(), edges: edges.collect() }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_digest_is_the_one_that_a_robot_has_of_the_same_map() {
+        let mut map: Map<8> = Map::new();
+        let radius = |radius_mm| toposlam::Fingerprint::from_radius_mm(radius_mm).unwrap();
+        let [a, b, c] = [1200, 400, 700].map(|radius_mm| map.add_vertex(radius(radius_mm)).unwrap());
+        map.add_edge(a, c);
+        map.add_edge(b, b);
+        assert_eq!(TopologicalMap::from(&map).digest(), toposlam::wire::map_digest(&map));
+        assert_eq!(TopologicalMap::default().digest(), toposlam::wire::map_digest(&Map::<8>::new()));
+    }
+
+    #[test]
+    fn a_map_of_which_little_was_heard_has_the_vertices_of_its_edges() {
+        use toposlam::wire::{Arrival, Header, Message};
+        let mut picture = Picture::<64>::new();
+        picture.apply(Header { sequence: 0, arrival: Arrival::First }, &Message::Edge { a: 1, b: 3, present: true });
+        let topology = TopologicalMap::from(&picture);
+        assert_eq!((topology.vertices.len(), &topology.edges[..]), (4, &[(1, 3)][..]));
+        assert_eq!(topology.neighbours(), [vec![], vec![3], vec![], vec![1]]);
+        assert_eq!(topology.to_petgraph().edge_count(), 1);
+    }
+}

@@ -1,0 +1,102 @@
+//! What is known of the robot on a link, and where to draw its map: what every live view shows.
+//!
+//! ```
+//! use toposlam::wire::{Encoder, MAX_FRAME_BYTES, Message};
+//! use toposlam_link::{link::News, listener::Listener, watch::Watch};
+//!
+//! let mut watch = Watch::new("tcp:robot:7070");
+//! let (mut listener, mut frame) = (Listener::new(), [0; MAX_FRAME_BYTES]);
+//! let edge = Message::Edge { a: 0, b: 1, present: true };
+//! listener.feed(Encoder::new(0).encode(&edge, &mut frame)?, |listener, event| watch.hear(News::heard(listener, event)));
+//! watch.arrange();
+//! assert_eq!((watch.map().edges.as_slice(), watch.points().len()), ([(0, 1)].as_slice(), 2));
+//! # Ok::<(), toposlam::wire::EncodeError>(())
+//! ```
+
+use crate::layout::{Layout, Point};
+use crate::link::News;
+use crate::listener::Listener;
+use crate::topology::TopologicalMap;
+
+/// Whether the line is open.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Connection {
+    /// It is being opened for the first time.
+    Opening,
+    /// It is open.
+    Open,
+    /// It is not, for this reason, and is tried again and again.
+    Cut(String),
+    /// The standard input has ended.
+    Ended,
+}
+
+/// Takes in the news of a link, and keeps the picture of the map.
+#[derive(Clone, Debug)]
+pub struct Watch {
+    line: String,
+    connection: Connection,
+    listener: Listener,
+    map: TopologicalMap,
+    layout: Layout,
+}
+
+impl Watch {
+    /// A watch of a line of that name that has heard nothing.
+    pub fn new(line: &str) -> Self {
+        Self {
+            line: line.to_owned(),
+            connection: Connection::Opening,
+            listener: Listener::new(),
+            map: TopologicalMap::default(),
+            layout: Layout::new(),
+        }
+    }
+
+    /// Takes in what happened on the link.
+    pub fn hear(&mut self, news: News) {
+        match news {
+            News::Connected => self.connection = Connection::Open,
+            News::Disconnected(reason) => self.connection = Connection::Cut(reason),
+            News::Ended => self.connection = Connection::Ended,
+            News::Heard(event, listener) => {
+                if let Ok((header, message)) = &event {
+                    self.layout.hear(*header, message);
+                }
+                self.listener = *listener;
+            }
+            News::Answered(..) => {}
+        }
+    }
+
+    /// To be called before drawing: brings the map up to date, and gives each of its vertices a position.
+    pub fn arrange(&mut self) {
+        self.map = self.listener.map();
+        self.layout.arrange(&self.map);
+    }
+
+    /// The name of the line; `-` is the standard input.
+    pub fn line(&self) -> &str {
+        &self.line
+    }
+
+    /// Whether the line is open.
+    pub const fn connection(&self) -> &Connection {
+        &self.connection
+    }
+
+    /// All that was heard of the robot.
+    pub const fn listener(&self) -> &Listener {
+        &self.listener
+    }
+
+    /// The map as it was arranged last.
+    pub const fn map(&self) -> &TopologicalMap {
+        &self.map
+    }
+
+    /// The position of every vertex of the map.
+    pub fn points(&self) -> &[Point] {
+        self.layout.points()
+    }
+}

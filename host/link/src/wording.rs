@@ -1,0 +1,265 @@
+//! What a robot says, in plain words: one line for each message.
+//!
+//! ```
+//! use toposlam::wire::Message;
+//! use toposlam_link::wording;
+//!
+//! let seen = Message::Place { place_index: 3, frame_index: 210, radius_mm: 1172, degree: Some(3) };
+//! assert_eq!(wording::message(&seen), "place 3: radius 1172 mm, 3 ways, in frame 210");
+//! ```
+
+use toposlam::FaultKind;
+use toposlam::drive::DriveState;
+use toposlam::ring::Echo;
+use toposlam::wire::{
+    Arrival, Belief, Drive, Evidence, Health, Hello, Info, Journey, Message, Outcome, Renamed, Row, Worst,
+};
+
+use crate::listener::Event;
+
+/// The units of a logarithm on the wire that make one nat.
+const Q16: f64 = 65536.0;
+
+/// One event as a line: what was said, what is missing before it, or what was wrong with the bytes.
+pub fn event(event: Event<'_>) -> String {
+    match event {
+        Event::Damaged(error) => format!("damaged: {error}"),
+        Event::Message(header, said) => match header.arrival {
+            Arrival::AfterGap { lost } => format!("{} (after {lost} lost frames)", message(said)),
+            Arrival::Late => format!("{} (late, not counted)", message(said)),
+            Arrival::Restart => format!("{} (the robot has started anew)", message(said)),
+            Arrival::First | Arrival::InOrder => message(said),
+        },
+    }
+}
+
+/// One message as a line.
+pub fn message(message: &Message) -> String {
+    match message {
+        Message::Hello(hello) => introduction(hello),
+        Message::Place { place_index, frame_index, radius_mm, degree } => {
+            let ways = degree.map_or(String::new(), |degree| format!(", {degree} ways"));
+            format!("place {place_index}: radius {radius_mm} mm{ways}, in frame {frame_index}")
+        }
+        Message::Map { vertices, edges, digest } => {
+            format!("map: {vertices} vertices, {edges} edges, digest {digest:08x}")
+        }
+        Message::Vertex { vertex, radius_mm, visits } => {
+            format!("vertex {vertex}: radius {radius_mm} mm, {visits} visits")
+        }
+        Message::Edge { a, b, present: true } => format!("edge {a}-{b}"),
+        Message::Edge { a, b, present: false } => format!("no edge {a}-{b} any more"),
+        Message::Location(location) => format!("at vertex {} with place {}", location.vertex, location.place_index),
+        Message::Evidence(evidence) => reasons(evidence),
+        Message::Row(row) => whole_vertex(row),
+        Message::Fault { kind, count } => format!("fault {}: {count} times", fault_name(*kind)),
+        Message::Health(health) => condition(health),
+        Message::Ring { frame_index, echoes } => {
+            let ranges: Vec<String> = echoes.iter().map(range).collect();
+            format!("ring frame {frame_index}: {} mm", ranges.join(" "))
+        }
+        Message::Belief(belief) => probabilities(belief),
+        Message::Renamed(renamed) => new_numbers(renamed),
+        Message::Worst(worst) => worst_explained(worst),
+        Message::Reply(reply) => format!("reply to request {}: {}", reply.request, outcome(&reply.outcome)),
+        Message::Drive(drive) => steering(drive),
+        Message::Journey(Journey { vertex, state }) => format!("way to vertex {vertex}: {state}"),
+        other => format!("{other:?}"),
+    }
+}
+
+/// What came of a request.
+pub fn outcome(outcome: &Outcome) -> String {
+    match outcome {
+        Outcome::Done => "done".to_owned(),
+        Outcome::Info(info) => self::info(info).join(", "),
+        Outcome::Snapshot { total, offset, bytes } => {
+            format!("{} bytes from byte {offset} of a snapshot of {total}", bytes.as_slice().len())
+        }
+        Outcome::Refused(refusal) => format!("refused: {refusal}"),
+        other => format!("{other:?}"),
+    }
+}
+
+/// Which robot this is and what it does, in a few lines.
+pub fn info(info: &Info) -> Vec<String> {
+    let version = info.version;
+    let mapping = if info.localise_only { "keeps the map and localises" } else { "maps" };
+    let mut lines = vec![
+        format!("toposlam {}.{}.{}", version.major, version.minor, version.patch),
+        format!("start {}: {}", info.boot, info.reset_cause),
+        format!("up for {:.1} s", seconds(info.uptime_ms)),
+        format!("{}{mapping}", if info.paused { "paused; otherwise it " } else { "" }),
+    ];
+    lines.extend(info.going_to.map(|vertex| format!("on the way to vertex {vertex}")));
+    lines.push(match info.stored_bytes {
+        0 => "no snapshot stored".to_owned(),
+        bytes => format!("snapshot of {bytes} bytes stored {} places ago", info.stored_places_ago),
+    });
+    lines
+}
+
+/// The name of a kind of fault by its number, or the number when it is not known here.
+pub fn fault_name(kind: u8) -> String {
+    FaultKind::ALL.get(usize::from(kind)).map_or_else(|| format!("kind {kind}"), |kind| format!("{kind:?}"))
+}
+
+/// What the drive is doing, by its number.
+pub fn drive_state(state: u8) -> &'static str {
+    const STATES: [(DriveState, &str); 7] = [
+        (DriveState::FollowEdge, "follows an edge"),
+        (DriveState::Approach, "homes in on a place"),
+        (DriveState::ChooseExit, "looks for the ways out"),
+        (DriveState::TurnToExit, "turns to its way"),
+        (DriveState::Depart, "leaves a place"),
+        (DriveState::Stopped, "stands"),
+        (DriveState::Recover, "turns to where there is room"),
+    ];
+    STATES.iter().find(|&&(known, _)| known as u8 == state).map_or("does something unknown here", |&(_, text)| text)
+}
+
+/// A distance in millimetres, of which the greatest number means that it is infinite.
+pub fn distance(distance_mm: u16) -> String {
+    if distance_mm == u16::MAX { "infinite".to_owned() } else { format!("{distance_mm} mm") }
+}
+
+/// A logarithm of the wire in nats.
+pub fn nats(ln_q16: i32) -> f64 {
+    f64::from(ln_q16) / Q16
+}
+
+/// Seconds for a time of the wire.
+pub fn seconds(time_ms: u32) -> f64 {
+    f64::from(time_ms) / 1000.0
+}
+
+fn introduction(hello: &Hello) -> String {
+    let rooms = hello.capacities;
+    format!(
+        "hello: protocol version {}, schema {:#018x}, start {} ({}), seed {}, room for {} vertices, {} hypotheses, \
+         {} places, {} sonars",
+        hello.protocol_version,
+        hello.schema_hash,
+        hello.boot,
+        hello.reset_cause,
+        hello.seed,
+        rooms.vertices,
+        rooms.hypotheses,
+        rooms.history,
+        rooms.sonars
+    )
+}
+
+fn reasons(evidence: &Evidence) -> String {
+    format!(
+        "evidence of place {}: consistency {}, label {:.2}, consistency {:.2}, size {:.2}, lead {:.2} nats, {} hypotheses",
+        evidence.place_index,
+        distance(evidence.consistency_mm),
+        nats(evidence.ln_label_q16),
+        nats(evidence.ln_consistency_q16),
+        nats(evidence.ln_size_q16),
+        nats(evidence.lead_q16),
+        evidence.distinct_hypotheses
+    )
+}
+
+fn whole_vertex(row: &Row) -> String {
+    let neighbours: Vec<String> =
+        (0..64).filter(|vertex| row.neighbours >> vertex & 1 == 1).map(|vertex: u8| vertex.to_string()).collect();
+    format!(
+        "vertex {}: radius {} mm, {} visits, neighbours {}",
+        row.vertex,
+        row.radius_mm,
+        row.visits,
+        neighbours.join(" ")
+    )
+}
+
+fn condition(health: &Health) -> String {
+    format!(
+        "health: up for {:.1} s, {} turns, stack {} bytes, longest turn {} us",
+        seconds(health.uptime_ms),
+        health.loop_count,
+        health.stack_high_water_bytes,
+        health.worst_update_us
+    )
+}
+
+fn range(echo: Echo) -> String {
+    match echo {
+        Echo::Range { range_mm } => range_mm.to_string(),
+        Echo::Silence => "silence".to_owned(),
+        Echo::Dead => "dead".to_owned(),
+    }
+}
+
+fn probabilities(belief: &Belief) -> String {
+    let places: Vec<String> =
+        belief.places.as_slice().iter().map(|place| format!("{} {}‰", place.vertex, place.permille)).collect();
+    format!(
+        "belief after place {}: this map {}‰, at vertex {}",
+        belief.place_index,
+        belief.map_permille,
+        places.join(", ")
+    )
+}
+
+fn new_numbers(renamed: &Renamed) -> String {
+    let changes: Vec<String> = (0..)
+        .zip(renamed.names.as_slice())
+        .filter_map(|(before, _)| match renamed.now(before) {
+            Some(now) if now == before => None,
+            Some(now) => Some(format!("{before} is {now}")),
+            None => Some(format!("{before} is gone")),
+        })
+        .collect();
+    format!("vertices renamed with place {}: {}", renamed.place_index, changes.join(", "))
+}
+
+fn worst_explained(worst: &Worst) -> String {
+    let walk: Vec<String> = worst.vertices.as_slice().iter().map(u8::to_string).collect();
+    format!(
+        "worst explained: {} from walk {}, {} places ago",
+        distance(worst.distance_mm),
+        walk.join("-"),
+        worst.newest_age
+    )
+}
+
+fn steering(drive: &Drive) -> String {
+    format!(
+        "drive in frame {}: heading {} mrad, speed {}‰, {}",
+        drive.frame_index,
+        drive.heading_mrad,
+        drive.speed_permille,
+        drive_state(drive.state)
+    )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use toposlam::wire::{DecodeError, Header, List};
+
+    #[test]
+    fn what_is_missing_or_damaged_is_said() {
+        let edge = Message::Edge { a: 0, b: 1, present: false };
+        let header = Header { sequence: 1, arrival: Arrival::AfterGap { lost: 4 } };
+        assert_eq!(event(Event::Message(header, &edge)), "no edge 0-1 any more (after 4 lost frames)");
+        assert_eq!(event(Event::Damaged(DecodeError::Cut)), "damaged: the frame ends too early");
+    }
+
+    #[test]
+    fn renamed_vertices_are_told_by_their_numbers_before_and_now() {
+        let renamed = Renamed { place_index: 2, names: List::new([0, 2, 255]) };
+        assert_eq!(message(&Message::Renamed(renamed)), "vertices renamed with place 2: 1 is 2, 2 is gone");
+    }
+
+    #[test]
+    fn kinds_that_are_not_known_here_are_numbers() {
+        assert_eq!(message(&Message::Fault { kind: 14, count: 2 }), "fault DriveLost: 2 times");
+        assert_eq!(message(&Message::Fault { kind: 200, count: 2 }), "fault kind 200: 2 times");
+        assert_eq!(drive_state(DriveState::Approach as u8), "homes in on a place");
+        assert_eq!(drive_state(99), "does something unknown here");
+    }
+}

@@ -1,0 +1,267 @@
+//! A whole robot in a simulated building: it drives where its own code says, and what it finds is held to the truth.
+//!
+//! ```
+//! use toposlam::reference::SNAPSHOT_BYTES;
+//! use toposlam_sim::exploration::Exploration;
+//! use toposlam_sim::world::{Plan, RobotModel};
+//!
+//! let plan = Plan::built_in("flat").expect("it is built in");
+//! let mut buffer = [0; SNAPSHOT_BYTES];
+//! let mut exploration = Exploration::start(&plan, RobotModel::default(), 1, &mut buffer)?;
+//! while exploration.places() < 3 {
+//!     exploration.advance();
+//! }
+//! assert!(exploration.robot().mapper().map().vertices() >= 2);
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+
+use std::collections::VecDeque;
+
+use toposlam::drive::{Goal, VelocityCommand};
+use toposlam::place::Place;
+use toposlam::reference::{ROBOT, ReferenceRobot, SONARS};
+use toposlam::ring::RingFrame;
+use toposlam::robot::{Board, KeepError, Seen};
+use toposlam::wire::{Encoder, MAX_FRAME_BYTES, QueueFull, Request};
+use toposlam::{FaultCounters, FaultKind};
+
+use crate::Step;
+use crate::injector::{FaultRates, LineInjector, RingInjector};
+use crate::world::{BodyModel, Journal, Plan, RobotModel, Rover, VoronoiError};
+
+/// How long a ring frame lasts on the simulated board, in milliseconds.
+const FRAME_MS: u32 = 100;
+
+/// A board in memory: what it receives and sends are queues, its flash keeps the last snapshot, and its clock is set from outside.
+#[derive(Clone, Debug, Default)]
+pub struct MemoryBoard {
+    /// Bytes on their way to the robot.
+    pub received: VecDeque<u8>,
+    /// Bytes that the robot has sent.
+    pub sent: Vec<u8>,
+    /// Where the wheels are set to go.
+    pub velocity: VelocityCommand,
+    /// The time since the start.
+    pub now_ms: u32,
+    /// The newest snapshot.
+    pub kept: Vec<u8>,
+    /// How often the watchdog was fed.
+    pub fed: u64,
+}
+
+impl Board for MemoryBoard {
+    fn receive(&mut self) -> Option<u8> {
+        self.received.pop_front()
+    }
+
+    fn send(&mut self, frame: &[u8]) -> Result<(), QueueFull> {
+        self.sent.extend_from_slice(frame);
+        Ok(())
+    }
+
+    fn follow(&mut self, velocity: VelocityCommand) {
+        self.velocity = velocity;
+    }
+
+    fn feed_watchdog(&mut self) {
+        self.fed += 1;
+    }
+
+    fn now_ms(&mut self) -> u32 {
+        self.now_ms
+    }
+
+    fn stack_high_water_bytes(&mut self) -> u32 {
+        0
+    }
+
+    fn keep(&mut self, snapshot: &[u8]) -> Result<(), KeepError> {
+        self.kept = snapshot.to_vec();
+        Ok(())
+    }
+}
+
+/// A robot, its world, and a log of how the two compare.
+pub struct Exploration<'buffer> {
+    rover: Rover,
+    robot: Box<ReferenceRobot<'buffer>>,
+    board: MemoryBoard,
+    encoder: Encoder,
+    requests: u16,
+    ring_faults: FaultCounters,
+    /// What changes the frames and the received bytes, when faults are wanted.
+    injectors: Option<(RingInjector, LineInjector)>,
+    journal: Journal,
+    nodes: Vec<Option<usize>>,
+    steps: Vec<Step>,
+    frames: u64,
+    /// Frames while the robot paused: its detector does not number them.
+    frames_not_taken: u32,
+}
+
+impl<'buffer> Exploration<'buffer> {
+    /// Puts the reference robot on the plan's start. `buffer` is for its snapshots.
+    ///
+    /// # Errors
+    /// When the plan has no true map.
+    ///
+    /// # Panics
+    /// Never: the reference robot's settings are sound.
+    pub fn start(plan: &Plan, model: RobotModel, seed: u64, buffer: &'buffer mut [u8]) -> Result<Self, VoronoiError> {
+        let rover = Rover::new(plan, model, BodyModel::default(), seed)?;
+        let mut robot = Box::new(ReferenceRobot::new());
+        robot.start(&ROBOT, buffer).expect("the reference robot's settings are sound");
+        let journal = Journal::new(rover.true_map());
+        Ok(Self {
+            rover,
+            robot,
+            board: MemoryBoard::default(),
+            encoder: Encoder::new(0),
+            requests: 0,
+            ring_faults: FaultCounters::new(),
+            injectors: None,
+            journal,
+            nodes: Vec::new(),
+            steps: Vec::new(),
+            frames: 0,
+            frames_not_taken: 0,
+        })
+    }
+
+    /// Lets faults happen in [`Exploration::advance`] from now on.
+    pub fn set_faults(&mut self, rates: FaultRates, seed: u64) {
+        self.injectors = Some((RingInjector::new(rates, seed), LineInjector::new(rates, seed)));
+    }
+
+    /// The world's next frame. [`Exploration::map`] is to follow.
+    pub fn frame(&mut self) -> RingFrame<SONARS> {
+        let (frame, truth) = self.rover.frame();
+        self.journal.drive(&truth);
+        frame
+    }
+
+    /// One turn of the robot's main loop with a frame, which a fault may have changed.
+    pub fn map(&mut self, frame: &RingFrame<SONARS>) -> Seen {
+        self.board.now_ms = self.board.now_ms.wrapping_add(FRAME_MS);
+        self.frames += 1;
+        let seen = self.robot.turn(frame, &self.ring_faults, &mut self.board);
+        self.frames_not_taken += u32::from(self.robot.is_paused());
+        if let Some((place, update)) = &seen {
+            let frame_index = place.frame_index.saturating_add(self.frames_not_taken);
+            self.note(&Place { frame_index, ..*place });
+            let map = self.robot.mapper().map();
+            let (vertices, edges) = (map.vertices().len() as u8, map.edges().count());
+            self.steps.push(Step { place: *place, update: *update, vertices, edges });
+        }
+        seen
+    }
+
+    /// Notes a place that another robot in this world has found, in the world's frame with that number.
+    pub fn note(&mut self, place: &Place) {
+        self.nodes.push(self.journal.detect(place).node);
+    }
+
+    /// Drives on as far as until the next frame.
+    pub fn drive(&mut self, velocity: VelocityCommand) {
+        self.rover.follow(velocity);
+    }
+
+    /// All of it: a frame, a turn of the robot's main loop, and the way to the next frame. What the robot says meanwhile is
+    /// what its board then has sent.
+    pub fn advance(&mut self) -> Seen {
+        self.board.sent.clear();
+        let mut frame = self.frame();
+        if let Some((ring, line)) = &mut self.injectors {
+            frame = ring.disturb(frame, &mut self.ring_faults);
+            let sent = Vec::from(std::mem::take(&mut self.board.received));
+            self.board.received.extend(line.carry(&sent));
+            self.board.received.extend(line.noise());
+        }
+        let seen = self.map(&frame);
+        self.drive(self.board.velocity);
+        seen
+    }
+
+    /// Sends the robot a command over its line.
+    pub fn command(&mut self, command: toposlam::wire::Command) {
+        self.requests = self.requests.wrapping_add(1);
+        let mut buffer = [0; MAX_FRAME_BYTES];
+        let request = Request { id: self.requests, command };
+        // A buffer of that size is always enough.
+        let bytes = self.encoder.encode(&request, &mut buffer).unwrap_or(&[]);
+        self.board.received.extend(bytes);
+    }
+
+    /// Whether the robot was told to go to a vertex and is not there yet.
+    pub fn is_underway(&self) -> bool {
+        let drive = self.robot.drive();
+        matches!(drive.goal(), Goal::Vertex(_)) && drive.goal_status() == toposlam::drive::GoalStatus::Active
+    }
+
+    /// The robot.
+    pub const fn robot(&self) -> &ReferenceRobot<'buffer> {
+        &self.robot
+    }
+
+    /// The robot, to be restored or started anew.
+    pub const fn robot_mut(&mut self) -> &mut ReferenceRobot<'buffer> {
+        &mut self.robot
+    }
+
+    /// Its board.
+    pub const fn board(&mut self) -> &mut MemoryBoard {
+        &mut self.board
+    }
+
+    /// The faults of its ring so far, to be counted up by who makes them.
+    pub const fn ring_faults(&mut self) -> &mut FaultCounters {
+        &mut self.ring_faults
+    }
+
+    /// Its world.
+    pub const fn rover(&self) -> &Rover {
+        &self.rover
+    }
+
+    /// The log of its drive.
+    pub const fn journal(&self) -> &Journal {
+        &self.journal
+    }
+
+    /// How many places it has found.
+    pub fn places(&self) -> usize {
+        self.nodes.len()
+    }
+
+    /// How many ring frames it has taken.
+    pub const fn frames(&self) -> u64 {
+        self.frames
+    }
+
+    /// The true node of each place, in the order of the places; `None` for a phantom.
+    pub fn nodes(&self) -> &[Option<usize>] {
+        &self.nodes
+    }
+
+    /// What each place brought.
+    pub fn steps(&self) -> &[Step] {
+        &self.steps
+    }
+
+    /// Every fault so far.
+    pub fn faults(&self) -> FaultCounters {
+        self.robot.faults(&self.ring_faults)
+    }
+
+    /// How often the drive lost its way.
+    pub fn times_lost(&self) -> u32 {
+        self.robot.drive().faults().count(FaultKind::DriveLost)
+    }
+
+    /// The vertex that the best map takes each place for; `None` for a place that the history has forgotten.
+    pub fn path(&self) -> Vec<Option<usize>> {
+        let known: Vec<usize> = self.robot.mapper().filter().path().map(usize::from).collect();
+        let forgotten = self.nodes.len().saturating_sub(known.len());
+        std::iter::repeat_n(None, forgotten).chain(known.into_iter().map(Some)).collect()
+    }
+}

@@ -1,0 +1,66 @@
+//! A simulated building and a robot in it that drives the building's Voronoi graph and reads a ring of sonars.
+//!
+//! ```
+//! use toposlam::place::{PlaceConfig, PlaceDetector};
+//! use toposlam::ring::RingGeometry;
+//! use toposlam_sim::world::{Journal, Plan, RobotModel, SONARS, Simulation};
+//!
+//! let plan = Plan::built_in("ring").expect("it is built in");
+//! let mut simulation = Simulation::new(&plan, RobotModel::default(), 7)?;
+//! let mut journal = Journal::new(simulation.true_map());
+//! let mut detector = PlaceDetector::<SONARS>::new();
+//! detector.start(PlaceConfig::DEFAULT, RingGeometry::even())?;
+//! for (frame, truth) in simulation.by_ref().take(2000) {
+//!     journal.drive(&truth);
+//!     if let Some(place) = detector.observe(&frame) {
+//!         journal.detect(&place);
+//!     }
+//! }
+//! assert!(journal.report().found > 0);
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+
+mod journal;
+mod plan;
+mod rover;
+mod sight;
+mod simulation;
+mod voronoi;
+
+pub use journal::{Detection, Journal, Report};
+pub use plan::{Plan, PlanError};
+pub use rover::{BodyModel, Rover};
+pub use sight::{SONARS, SonarModel};
+pub use simulation::{Pose, RobotModel, Simulation, Truth};
+pub use voronoi::{TrueEdge, TrueMap, TrueNode, VoronoiError};
+
+/// A point of the floor plan, in millimetres from its lower left corner; x to the right, y up.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Point {
+    /// To the right, in millimetres.
+    pub x_mm: f64,
+    /// Up, in millimetres.
+    pub y_mm: f64,
+}
+
+impl Point {
+    /// A point from its coordinates.
+    pub const fn new(x_mm: f64, y_mm: f64) -> Self {
+        Self { x_mm, y_mm }
+    }
+
+    /// The distance to another point, in millimetres.
+    pub fn distance_mm(self, other: Self) -> f64 {
+        (self.x_mm - other.x_mm).hypot(self.y_mm - other.y_mm)
+    }
+
+    /// The direction to another point, counter-clockwise from the x axis, in radians.
+    fn direction_to(self, other: Self) -> f64 {
+        (other.y_mm - self.y_mm).atan2(other.x_mm - self.x_mm)
+    }
+
+    /// The point at this share of the way to another.
+    fn towards(self, other: Self, share: f64) -> Self {
+        Self::new(self.x_mm + (other.x_mm - self.x_mm) * share, self.y_mm + (other.y_mm - self.y_mm) * share)
+    }
+}
