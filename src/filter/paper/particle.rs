@@ -1,6 +1,6 @@
 //! One particle: a map, the place the robot is at, and the weight (Section III.A).
 
-use crate::filter::WeightFactors;
+use crate::filter::PaperFactors;
 use crate::{Fingerprint, Map};
 
 /// One hypothesis: a map and the place the robot is at.
@@ -17,12 +17,12 @@ pub struct Particle<const V: usize> {
     /// The distance of Eq. 2 in millimetres; `u16::MAX` when it is infinite.
     pub consistency_mm: u16,
     /// The factors of its weight.
-    pub factors: WeightFactors,
+    pub factors: PaperFactors,
 }
 
 impl<const V: usize> Particle<V> {
     pub(super) const NONE: Self =
-        Self { map: Map::new(), place: 0, multiplicity: 0, parent: 0, consistency_mm: 0, factors: WeightFactors::ONE };
+        Self { map: Map::new(), place: 0, multiplicity: 0, parent: 0, consistency_mm: 0, factors: PaperFactors::ONE };
 }
 
 /// Predicts that the robot went from the place of a particle to a vertex, a new one behind the last: the edge is added
