@@ -63,20 +63,20 @@ texts!(PlaceConfigError {
 });
 
 texts!(SonarFault {
-    Silent => "did not answer in time",
-    OutOfRange => "answered with an impossible range",
-    Bus => "could not be reached: bus or pin error",
-    Stuck => "holds its line high before it is asked",
-    Clock => "could not be timed: the clock stands still",
+    Silent => "timed out",
+    OutOfRange => "returned a range outside its limits",
+    Bus => "is not reachable: bus or pin error",
+    Stuck => "holds its echo line high before the trigger",
+    Clock => "cannot be timed: the clock does not advance",
 });
 
 texts!(AddressError {
     From => "from is out of its range",
     To => "to is out of its range",
-    Taken => "a device answers at the wanted address already",
+    Taken => "a device already answers at the new address",
     Silent => "no sensor acknowledged the present address",
     Bus => "bus error",
-    Unchanged => "nothing answers at the wanted address afterwards",
+    Unchanged => "no device answers at the new address afterwards",
 });
 
 texts!(BridgeError {
@@ -93,7 +93,7 @@ texts!(BridgeError {
 texts!(HcSr04ConfigError {
     Trigger => "trigger_us is out of its range",
     Timeout => "rise_timeout_us or echo_timeout_us is out of its range",
-    StandstillPolls => "standstill_polls is out of its range",
+    StoppedClockPolls => "stopped_clock_polls is out of its range",
     SpeedOfSound => "speed_of_sound_m_per_s is out of its range",
     Range => "min_range_mm is above max_range_mm",
 });

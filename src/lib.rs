@@ -132,6 +132,7 @@
 #![cfg_attr(not(test), no_std)]
 #![forbid(unsafe_code)]
 
+mod bearing;
 #[cfg(feature = "snapshot")]
 mod checksum;
 #[cfg(feature = "defmt")]

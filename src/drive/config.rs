@@ -1,23 +1,23 @@
-//! The drive's settings: documented defaults, checked once.
+//! Settings of the drive, checked once at the start.
 
 use core::fmt;
 
-/// How the robot keeps to the Voronoi graph.
+/// Settings of the motion along the Voronoi graph.
 ///
-/// The defaults suit a robot that drives some 30 mm between two ring frames.
+/// The defaults are for a robot that drives some 30 mm between two ring frames.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct DriveConfig {
-    /// Full speed along an edge, in thousandths of what the wheels can, 1 to 1000. Default 1000.
+    /// Speed along an edge, in thousandths of the robot's full speed, 1 to 1000. Default 1000.
     pub speed_permille: u16,
-    /// The pilot steers for the point of the edge that is this far ahead, in millimetres, at least 1. Default 400. Shorter
-    /// follows bends and noise more closely.
+    /// Look-ahead distance along the edge, in millimetres, at least 1. Default 400. A shorter one follows bends and noise more
+    /// closely.
     pub look_ahead_mm: u16,
-    /// A meet point has been reached when it is this near, in millimetres. Default 40.
+    /// Distance within which a meet point counts as reached, in millimetres. Default 40.
     pub arrival_tolerance_mm: u16,
-    /// The robot backs away from anything straight ahead that is this near, in millimetres. Default 250.
+    /// Minimum range ahead, in millimetres. Default 250. The robot turns away from a nearer obstacle.
     pub clearance_mm: u16,
-    /// The pilot gives up what it is at, and looks for the graph anew, after so many ring frames without success, at
-    /// least 1. Default 100.
+    /// Maximum duration of a manoeuvre in ring frames, at least 1. Default 100. After it the drive is lost and searches for
+    /// the graph.
     pub timeout_frames: u16,
 }
 

@@ -1,6 +1,6 @@
 //! What the drive did at each place of the history, and what that tells of the ways of a vertex.
 
-use super::pilot::WaysOut;
+use super::local_planner::Exits;
 use crate::Filter;
 
 /// A place has at most so many ways; the seventh and eighth have no room in the note of a place.
@@ -48,8 +48,8 @@ impl<const HISTORY: usize> Departures<HISTORY> {
     }
 
     /// The robot leaves the newest place by this way.
-    pub(super) fn depart(&mut self, ways: WaysOut, exit: u8) {
-        let known = ways.came_by_first && usize::from(ways.count) <= WAYS && exit < ways.count;
+    pub(super) fn depart(&mut self, ways: Exits, exit: u8) {
+        let known = ways.is_entry_first && usize::from(ways.count) <= WAYS && exit < ways.count;
         self.note(if known { ways.count | exit << EXIT_SHIFT } else { 0 });
     }
 

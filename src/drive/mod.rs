@@ -1,28 +1,37 @@
-//! The drive: ring frames in, a heading and a speed out, along the generalised Voronoi graph and from place to place.
+//! Motion planning: ring frames in, a velocity command out, along the generalised Voronoi graph and from place to place.
 //!
 //! ```text
-//! PlaceDetector ─ smoothed ring ─▶ Pilot ─ VelocityCommand ─▶ wheels
-//! Filter ─ best map, belief ─▶ Navigator ─ which way ─▶ Pilot
-//!                                  ▲ turn hint, back to the filter
+//! PlaceDetector ─ RingScan ─▶ local planner ─ VelocityCommand ─▶ wheels
+//! Filter ─ best map, path ─▶ route planner ─ exit ─▶ local planner
+//!                                 ▲ turn hint, back to the filter
 //! ```
 //!
-//! The `Pilot` keeps the robot equidistant from the two closest obstacles, homes in on the point where a third is as
-//! close, stands there until the detector reports the place, and leaves by the way that the navigator names. It tells ways
-//! apart by their order in bearing, beginning with the one it came by; nothing is metric and there is no odometry. The
-//! navigator knows what it did at each place of the history; with the filter's best path that tells which way of a place leads to
-//! which vertex, and each revision of the path revises it all.
+//! | Step | File |
+//! |---|---|
+//! | Heading along an edge, position of a meet point | `voronoi.rs` |
+//! | Rotation of the ring from frame to frame | `rotation.rs` |
+//! | State machine from place to place ([`DriveState`]) | `local_planner.rs` |
+//! | Which exit leads to which vertex, and how often it was used | `departures.rs` |
+//! | Choice of an exit: explore, or drive to a vertex ([`Goal`]) | `route_planner.rs` |
+//! | Velocity command to PWM ([`DifferentialDrive`]) | `wheels.rs` |
+//!
+//! The local planner keeps the robot equidistant from the two closest obstacles. It stops where a third is equidistant,
+//! until the detector reports the place, and leaves by the exit that the route planner chooses. The exits of a place are
+//! numbered counter-clockwise from the one by which the robot entered. There is no metric position and no odometry. The
+//! route planner remembers the exits taken at the places of the history. Combined with the filter's best path, they give the
+//! exit that leads to each neighbour of a vertex, and every revision of the path revises them.
 
 mod config;
 mod departures;
-mod navigator;
-mod pilot;
-mod steering;
-mod turning;
+mod local_planner;
+mod rotation;
+mod route_planner;
+mod voronoi;
 mod wheels;
 
 pub use config::{DriveConfig, DriveConfigError};
-pub use navigator::{Goal, GoalStatus};
-pub use pilot::DriveState;
+pub use local_planner::DriveState;
+pub use route_planner::{Goal, GoalStatus};
 pub use wheels::{DifferentialDrive, MotorError, Wheel, WheelSpeeds, WheelsConfig, WheelsConfigError};
 
 #[cfg(feature = "snapshot")]
@@ -30,53 +39,54 @@ pub(crate) use departures::is_departure;
 
 use crate::place::{Place, PlaceDetector};
 use crate::{FaultCounters, Filter, Turn, Update};
-use navigator::Navigator;
-use pilot::Pilot;
+use local_planner::LocalPlanner;
+use route_planner::RoutePlanner;
 
-/// Where to go until the next ring frame.
+/// Heading and speed to drive with until the next ring frame.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct VelocityCommand {
-    /// The direction to drive in, in milliradians, counter-clockwise from where the first bearing of the ring's geometry is 0.
+    /// Direction in milliradians, −3142 to 3142: counter-clockwise from bearing 0 of the ring's geometry.
     pub heading_mrad: i16,
-    /// How fast, in thousandths of the robot's full speed; 0 to turn on the spot, or to stand when the heading is 0 as well.
+    /// Speed in thousandths of the robot's full speed, 0 to 1000. With 0 the robot turns in place, or stops when the heading
+    /// is 0 as well.
     pub speed_permille: u16,
 }
 
 impl VelocityCommand {
-    /// Stand still.
+    /// Stops the robot.
     pub const STOP: Self = Self { heading_mrad: 0, speed_permille: 0 };
 }
 
-/// The drive of a robot whose maps have at most `V` vertices and whose filter remembers `HISTORY` places.
+/// The motion planner of a robot whose maps have at most `V` vertices and whose filter remembers `HISTORY` places.
 ///
-/// Const-constructed to zero. Memory: about `HISTORY + 160` bytes. Time for a ring frame: O(SONARS); at a place O(V · HISTORY).
+/// A `static` of it is in `.bss`. Memory: about `HISTORY + 160` bytes. Time for a ring frame: O(SONARS); at a place O(V · HISTORY).
 #[derive(Clone, Debug)]
 pub struct Drive<const V: usize, const HISTORY: usize> {
-    pilot: Pilot,
-    navigator: Navigator<V, HISTORY>,
+    local_planner: LocalPlanner,
+    route_planner: RoutePlanner<V, HISTORY>,
 }
 
 impl<const V: usize, const HISTORY: usize> Drive<V, HISTORY> {
-    /// A drive that waits for [`Drive::start`].
+    /// Creates a drive that is not started.
     pub const fn new() -> Self {
-        Self { pilot: Pilot::new(), navigator: Navigator::new() }
+        Self { local_planner: LocalPlanner::new(), route_planner: RoutePlanner::new() }
     }
 
-    /// Forgets everything and starts anew: looks for the Voronoi graph, and explores. `seed` decides between equals.
+    /// Resets the drive and starts it: it searches for the Voronoi graph and explores. `seed` decides between equal exits.
     ///
     /// # Errors
-    /// Names the first setting that is out of its range; the drive is then as it was.
+    /// The first setting that is out of its range; the drive does not change then.
     pub fn start(&mut self, config: DriveConfig, seed: u64) -> Result<(), DriveConfigError> {
         config.check()?;
-        self.pilot.start(config);
-        self.navigator.start(seed);
+        self.local_planner.start(config);
+        self.route_planner.start(seed);
         Ok(())
     }
 
-    /// Takes what the detector and the filter made of a ring frame, and says where to go. With too few live sensors the robot
-    /// stands until it hears again.
+    /// Returns the velocity command for a ring frame that the detector and the filter have processed.
     ///
-    /// `seen` is what the mapper said of the frame.
+    /// `seen` is the place that the frame completed, if any, and the filter's update for it. With too few live sensors the
+    /// robot stops until there are enough again.
     #[inline(never)]
     pub fn advance<const SONARS: usize, F: Filter<V>>(
         &mut self,
@@ -85,82 +95,83 @@ impl<const V: usize, const HISTORY: usize> Drive<V, HISTORY> {
         seen: Option<(&Place, &Update)>,
     ) -> VelocityCommand {
         if let Some((place, update)) = seen {
-            self.navigator.arrive(filter, update);
-            self.pilot.arrive(place.degree);
+            self.route_planner.arrive(filter, update);
+            self.local_planner.arrive(place.degree);
         }
         if detector.is_blind() {
             return VelocityCommand::STOP;
         }
-        let navigator = &mut self.navigator;
-        self.pilot.advance(&detector.scan(), detector.is_at_place(), |ways| navigator.choose(filter, ways))
+        let route_planner = &mut self.route_planner;
+        self.local_planner
+            .advance(&detector.scan(), detector.is_at_place(), |exits| route_planner.choose(filter, exits))
     }
 
-    /// How the robot left the place before the one it may be at, if it knows: the hint for the filter.
+    /// How the robot left the place that was reported last: the turn hint of the next observation. `None` when unknown.
     pub const fn turn(&self) -> Option<Turn> {
-        self.pilot.turn()
+        self.local_planner.turn()
     }
 
-    /// Explore, go to a vertex, or stand at the next place.
+    /// Sets the goal. A robot that stopped at a place chooses an exit again.
     pub fn set_goal(&mut self, goal: Goal) {
-        self.navigator.set_goal(goal);
-        self.pilot.reconsider();
+        self.route_planner.set_goal(goal);
+        self.local_planner.reconsider();
     }
 
-    /// Drives at another speed from now on.
+    /// Sets the speed along edges, in thousandths of full speed, 1 to 1000.
     ///
     /// # Errors
-    /// [`DriveConfigError::SpeedPermille`]; the drive goes on as it did.
+    /// [`DriveConfigError::SpeedPermille`]; the speed does not change then.
     pub fn set_speed(&mut self, speed_permille: u16) -> Result<(), DriveConfigError> {
-        self.pilot.set_speed(speed_permille)
+        self.local_planner.set_speed(speed_permille)
     }
 
-    /// Whether the best map has a way from where the robot is to a vertex.
+    /// Whether the best map has a path from the robot's vertex to another one. Time O(V²).
     pub fn leads_to(&self, filter: &impl Filter<V>, vertex: u8) -> bool {
-        navigator::leads_to(filter, vertex)
+        route_planner::leads_to(filter, vertex)
     }
 
-    /// What the drive is asked to do.
+    /// The current goal.
     pub const fn goal(&self) -> Goal {
-        self.navigator.goal()
+        self.route_planner.goal()
     }
 
-    /// How the way to the last goal went.
+    /// The status of the current goal, if it is a vertex.
     pub const fn goal_status(&self) -> GoalStatus {
-        self.navigator.goal_status()
+        self.route_planner.goal_status()
     }
 
-    /// What the pilot does.
+    /// What the drive is doing.
     pub const fn state(&self) -> DriveState {
-        self.pilot.state()
+        self.local_planner.state()
     }
 
-    /// Whether the robot has not left the place that was reported last: [`PlaceDetector::hold_place`] is for it.
+    /// Whether the robot has not left the place that was reported last. If so, call [`PlaceDetector::hold_place`].
     pub const fn holds_place(&self) -> bool {
-        self.pilot.holds_place()
+        self.local_planner.holds_place()
     }
 
-    /// The robot was, or may have been, carried: what it did at the newest place led nowhere.
+    /// Tells the drive that the robot may have been moved to another place: the exit that it took last is void.
     pub fn kidnapped(&mut self) {
-        self.navigator.forget_departure();
-        self.pilot.lose_way();
+        self.route_planner.forget_departure();
+        self.local_planner.forget_edge();
     }
 
-    /// How the robot left each place of the history, the oldest first: one byte each.
+    /// How the robot left each place of the history, oldest first: one byte each.
     #[cfg(feature = "snapshot")]
     pub(crate) fn departures(&self) -> impl ExactSizeIterator<Item = u8> + '_ {
-        self.navigator.departures()
+        self.route_planner.departures()
     }
 
-    /// Explores from here on, with these departures at the places of the history and no others.
+    /// Replaces the departures at the places of the history, oldest first, and explores.
     #[cfg(feature = "snapshot")]
     pub(crate) fn resume(&mut self, departures: impl Iterator<Item = u8>) {
-        self.navigator.resume(departures);
-        self.pilot.lose_way();
+        self.route_planner.resume(departures);
+        self.local_planner.forget_edge();
     }
 
-    /// How often the drive lost its way.
+    /// Faults since the start: how often the drive lost the graph ([`FaultKind::DriveLost`](crate::FaultKind::DriveLost)).
     pub const fn faults(&self) -> &FaultCounters {
-        self.pilot.faults()
+        self.local_planner.faults()
     }
 }
 

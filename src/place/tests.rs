@@ -1,9 +1,11 @@
-//! The place detector on frames made by hand: a corridor of 2 m and its end.
+//! The place detector on synthetic frames: a corridor 2 m wide and its end.
 
 use super::*;
+use crate::ring::{Echo, RingFrame, RingGeometry};
+use crate::{FaultCounters, FaultKind};
 
-/// An even ring and a robot in a corridor 2 m wide that looks along it, with the end wall so far ahead. Each sensor
-/// sees what lies on its axis.
+/// An even ring and its frame in a corridor 2 m wide, with the end wall `end_mm` straight ahead. Each sensor measures along
+/// its axis.
 fn corridor<const SONARS: usize>(end_mm: u16) -> (RingGeometry<SONARS>, RingFrame<SONARS>) {
     let mut geometry = RingGeometry { bearings_mrad: [0; SONARS] };
     let mut frame = RingFrame { echoes: [Echo::Silence; SONARS] };
@@ -27,7 +29,7 @@ fn started<const SONARS: usize>() -> PlaceDetector<SONARS> {
     detector
 }
 
-/// Drives from 3 m before the end wall to the dead end's meet point, waits there, and drives back.
+/// The distance to the end wall while the robot drives to the dead end's meet point, stops there and drives back.
 fn in_and_out() -> impl Iterator<Item = u16> {
     let way_in = (1000..3000).rev().step_by(30);
     let way_out = (1000..3000).step_by(30);
@@ -48,26 +50,26 @@ fn a_dead_end_is_one_place<const SONARS: usize>() {
 }
 
 #[test]
-fn a_dead_end_is_one_place_to_rings_of_8_16_and_24() {
+fn a_dead_end_is_one_place_for_rings_of_8_16_and_24() {
     a_dead_end_is_one_place::<8>();
     a_dead_end_is_one_place::<16>();
     a_dead_end_is_one_place::<24>();
 }
 
 #[test]
-fn a_corridor_is_no_place() {
+fn a_corridor_is_not_a_place() {
     let frames = [corridor::<16>(6000).1; 200];
     assert_eq!(places(&mut started::<16>(), &frames), []);
 }
 
 #[test]
-fn a_robot_that_stands_still_gets_one_place() {
+fn a_robot_that_stops_at_a_meet_point_reports_it_once() {
     let frames = [corridor::<16>(1000).1; 300];
     assert_eq!(places(&mut started::<16>(), &frames).len(), 1);
 }
 
 #[test]
-fn flicker_between_frames_gives_one_place() {
+fn a_meet_point_that_flickers_is_reported_once() {
     let mut frames: Vec<_> = in_and_out().map(|end_mm| corridor::<16>(end_mm).1).collect();
     for (number, frame) in frames.iter_mut().enumerate() {
         match number % 5 {
@@ -80,14 +82,14 @@ fn flicker_between_frames_gives_one_place() {
 }
 
 #[test]
-fn one_meeting_frame_alone_is_no_place() {
+fn a_single_frame_does_not_confirm_a_place() {
     let mut frames = [corridor::<16>(6000).1; 50];
     frames[20] = corridor(1000).1;
     assert_eq!(places(&mut started::<16>(), &frames), []);
 }
 
 #[test]
-fn any_one_dead_sensor_keeps_the_place() {
+fn a_place_is_detected_with_any_one_sensor_dead() {
     for dead in 0..16 {
         let mut frames: Vec<_> = in_and_out().map(|end_mm| corridor::<16>(end_mm).1).collect();
         frames.iter_mut().for_each(|frame| frame.echoes[dead] = Echo::Dead);
@@ -98,28 +100,28 @@ fn any_one_dead_sensor_keeps_the_place() {
 }
 
 #[test]
-fn a_ring_of_dead_sensors_is_blind_and_counted() {
+fn frames_without_live_sensors_count_as_blind() {
     let mut detector = started::<16>();
     assert_eq!(places(&mut detector, &[RingFrame { echoes: [Echo::Dead; 16] }; 40]), []);
     assert_eq!(detector.faults().count(FaultKind::RingBlind), 40);
 }
 
 #[test]
-fn blind_frames_in_the_middle_do_not_split_a_place() {
+fn blind_frames_do_not_split_a_place() {
     let mut frames: Vec<_> = in_and_out().map(|end_mm| corridor::<16>(end_mm).1).collect();
     frames[70..74].fill(RingFrame { echoes: [Echo::Dead; 16] });
     assert_eq!(places(&mut started::<16>(), &frames).len(), 1);
 }
 
 #[test]
-fn silence_all_around_is_no_place_and_no_fault() {
+fn a_ring_without_echoes_detects_no_place_and_counts_no_fault() {
     let mut detector = started::<16>();
     assert_eq!(places(&mut detector, &[RingFrame { echoes: [Echo::Silence; 16] }; 40]), []);
     assert_eq!(*detector.faults(), FaultCounters::new());
 }
 
 #[test]
-fn zero_ranges_are_nonsense_and_no_place() {
+fn zero_ranges_count_as_out_of_range_and_detect_no_place() {
     let mut detector = started::<16>();
     assert_eq!(places(&mut detector, &[RingFrame { echoes: [Echo::Range { range_mm: 0 }; 16] }; 40]), []);
     assert_eq!(detector.faults().count(FaultKind::SonarOutOfRange), 640);
@@ -127,7 +129,7 @@ fn zero_ranges_are_nonsense_and_no_place() {
 }
 
 #[test]
-fn a_radius_that_no_fingerprint_holds_is_counted() {
+fn a_radius_above_the_largest_fingerprint_is_counted() {
     let config = PlaceConfig { range_max_mm: 20_000, ..PlaceConfig::DEFAULT };
     let mut detector = PlaceDetector::<16>::new();
     detector.start(config, corridor(6000).0).unwrap();
@@ -145,21 +147,21 @@ fn the_longest_ranges_do_not_overflow() {
 }
 
 #[test]
-fn a_detector_that_was_not_started_says_nothing() {
+fn a_detector_before_its_start_reports_nothing() {
     let mut detector = PlaceDetector::<16>::new();
     assert_eq!(places(&mut detector, &[corridor::<16>(1000).1; 100]), []);
 }
 
 #[test]
-fn a_bearing_beyond_half_a_turn_is_refused() {
+fn a_bearing_beyond_half_a_turn_is_rejected() {
     let mut geometry = corridor::<16>(1000).0;
     geometry.bearings_mrad[3] = 3143;
     let refused = PlaceDetector::<16>::new().start(PlaceConfig::DEFAULT, geometry);
     assert_eq!(refused, Err(PlaceConfigError::Bearing));
 }
 
-/// A robot in a corridor 1.6 m wide that looks so far to the left, and hears its walls up to 25° off their normal in cones of 30°,
-/// with an error of up to 40 mm.
+/// A frame in a corridor 1.6 m wide with the robot's heading `heading_deg` off its axis. A sensor with a cone of 30° detects
+/// a wall up to 25° off its normal, with an error of up to 40 mm.
 fn askew(heading_deg: i32, random: &mut u32) -> RingFrame<16> {
     let mut frame = RingFrame { echoes: [Echo::Silence; 16] };
     for (echo, axis_deg) in frame.echoes.iter_mut().zip((0..).map(|sonar| f64::from(sonar) * 22.5)) {
@@ -177,7 +179,7 @@ fn askew(heading_deg: i32, random: &mut u32) -> RingFrame<16> {
 }
 
 #[test]
-fn a_corridor_is_no_place_to_a_ring_with_a_dead_sensor_in_whatever_order_the_sensors_are_given() {
+fn a_corridor_is_not_a_place_with_a_dead_sensor_in_any_order_of_the_sensors() {
     for (dead, step) in (0..16).flat_map(|dead| [(dead, 1), (dead, 5)]) {
         let shuffled = |sensor: usize| sensor * step % 16;
         let in_order = corridor::<16>(6000).0.bearings_mrad;
@@ -193,21 +195,4 @@ fn a_corridor_is_no_place_to_a_ring_with_a_dead_sensor_in_whatever_order_the_sen
             assert_eq!(place, None, "with sensor {dead} dead, in steps of {step}, at frame {frame}");
         }
     }
-}
-
-#[test]
-fn two_echoes_among_four_readings_are_heard_and_one_is_not() {
-    let heard = |readings: [u16; 4]| {
-        let [first_mm, long_before_mm, before_mm, now_mm] = readings;
-        smoothed(now_mm, before_mm, long_before_mm, first_mm)
-    };
-    assert_eq!(heard([900, 910, 920, 930]), 920);
-    assert_eq!(heard([900, SILENT, 920, 930]), 930);
-    assert_eq!(heard([900, SILENT, SILENT, 930]), 930);
-    assert_eq!(heard([900, SILENT, 920, SILENT]), 920);
-    assert_eq!(heard([SILENT, SILENT, 920, SILENT]), SILENT);
-    assert_eq!(heard([900, SILENT, SILENT, SILENT]), SILENT);
-    assert_eq!(heard([900, DEAD, DEAD, SILENT]), SILENT);
-    assert_eq!(heard([900, 910, DEAD, SILENT]), 910);
-    assert_eq!(heard([900, 910, 920, DEAD]), DEAD);
 }

@@ -3,7 +3,7 @@
 use rand_core::Rng;
 
 use super::departures::{Departures, WAYS, Way};
-use super::pilot::WaysOut;
+use super::local_planner::Exits;
 use crate::filter::draws;
 use crate::{Filter, Update};
 
@@ -40,7 +40,7 @@ pub enum GoalStatus {
 
 /// Decides at places; remembers one byte for each of `HISTORY` places.
 #[derive(Clone, Debug)]
-pub(super) struct Navigator<const V: usize, const HISTORY: usize> {
+pub(super) struct RoutePlanner<const V: usize, const HISTORY: usize> {
     seed: u64,
     goal: Goal,
     goal_status: GoalStatus,
@@ -51,7 +51,7 @@ pub(super) struct Navigator<const V: usize, const HISTORY: usize> {
     departures: Departures<HISTORY>,
 }
 
-impl<const V: usize, const HISTORY: usize> Navigator<V, HISTORY> {
+impl<const V: usize, const HISTORY: usize> RoutePlanner<V, HISTORY> {
     pub(super) const fn new() -> Self {
         Self {
             seed: 0,
@@ -115,8 +115,8 @@ impl<const V: usize, const HISTORY: usize> Navigator<V, HISTORY> {
     }
 
     /// Chooses the way out of the place that the robot stands at; `None` to stay.
-    pub(super) fn choose(&mut self, filter: &impl Filter<V>, ways: WaysOut) -> Option<u8> {
-        let known = self.departures.ways(filter, if ways.came_by_first { ways.count } else { 0 });
+    pub(super) fn choose(&mut self, filter: &impl Filter<V>, ways: Exits) -> Option<u8> {
+        let known = self.departures.ways(filter, if ways.is_entry_first { ways.count } else { 0 });
         self.decisions = self.decisions.wrapping_add(1);
         let chosen = match self.goal {
             Goal::Stop => None,

@@ -1,13 +1,15 @@
-//! Angles in milliradians, counter-clockwise positive, 0 straight ahead, without floating point.
+//! Integer arithmetic on bearings and plane vectors, shared by `place` and `drive`.
+//!
+//! A bearing is an angle in milliradians, −3142 to 3142: 0 is straight ahead, positive is counter-clockwise (left).
 
-/// Half a turn.
+/// Half a turn, π in milliradians.
 pub(crate) const HALF_TURN_MRAD: i16 = 3142;
 const HALF: i32 = HALF_TURN_MRAD as i32;
 
-/// The length of the vectors of [`unit`].
+/// Length of the vectors that [`unit`] returns.
 pub(crate) const UNIT: i32 = 1 << 12;
 
-/// The turn from one bearing to another the short way round, counter-clockwise positive.
+/// Signed angle from one bearing to another, −3142 to 3142.
 pub(crate) fn turn_mrad(from_mrad: i16, to_mrad: i16) -> i32 {
     let turn_mrad = i32::from(to_mrad) - i32::from(from_mrad);
     if turn_mrad > HALF {
@@ -19,12 +21,18 @@ pub(crate) fn turn_mrad(from_mrad: i16, to_mrad: i16) -> i32 {
     }
 }
 
-/// A bearing turned by an angle of at most two turns, −3142 to 3142.
-pub(crate) fn turned(bearing_mrad: i16, by_mrad: i32) -> i16 {
+/// Angle from one bearing to another counter-clockwise, 0 to 6284.
+pub(crate) fn counter_clockwise_mrad(from_mrad: i16, to_mrad: i16) -> i32 {
+    let turn_mrad = turn_mrad(from_mrad, to_mrad);
+    if turn_mrad < 0 { turn_mrad + 2 * i32::from(HALF_TURN_MRAD) } else { turn_mrad }
+}
+
+/// Rotates a bearing by an angle of at most two turns. The result is −3142 to 3142.
+pub(crate) fn rotated(bearing_mrad: i16, by_mrad: i32) -> i16 {
     (i32::from(bearing_mrad).saturating_add(by_mrad).saturating_add(5 * HALF) % (2 * HALF) - HALF) as i16
 }
 
-/// A vector in units of its own: x ahead, y to the left.
+/// A vector in the robot's frame: x ahead, y to the left. The unit is the caller's.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Vector {
     pub(crate) x: i32,
@@ -32,13 +40,14 @@ pub(crate) struct Vector {
 }
 
 impl Vector {
+    /// Euclidean length, rounded down and saturated.
     pub(crate) fn length(self) -> i32 {
         let square = |side: i32| u64::from(side.unsigned_abs()).pow(2);
         square(self.x).saturating_add(square(self.y)).isqrt().min(i32::MAX as u64) as i32
     }
 
-    /// Where the vector points; straight ahead if it has no length. Right to 5 mrad: the arcus tangent is
-    /// z · (π/4 + 0.273 · (1 − z)) in the first octant.
+    /// Bearing of the vector, 0 for the null vector. The error is at most 5 mrad: in the first octant the arctangent is
+    /// approximated by z · (π/4 + 0.273 · (1 − z)).
     pub(crate) fn bearing_mrad(self) -> i16 {
         let (x, y) = (i64::from(self.x.unsigned_abs()), i64::from(self.y.unsigned_abs()));
         let (short, long) = (x.min(y), x.max(y));
@@ -50,10 +59,10 @@ impl Vector {
     }
 }
 
-/// The vector of length [`UNIT`] that points somewhere. Right to 0.2 %: the sine is Bhaskara's,
-/// 16 x (π − x) / (5 π² − 4 x (π − x)) from 0 to π.
+/// Vector of length [`UNIT`] with the given bearing. The error is at most 0.2 %: the sine is Bhaskara's approximation,
+/// 16 x (π − x) / (5 π² − 4 x (π − x)) for x from 0 to π.
 pub(crate) fn unit(bearing_mrad: i16) -> Vector {
-    Vector { x: sine(turned(bearing_mrad, HALF / 2)), y: sine(bearing_mrad) }
+    Vector { x: sine(rotated(bearing_mrad, HALF / 2)), y: sine(bearing_mrad) }
 }
 
 fn sine(bearing_mrad: i16) -> i32 {
@@ -63,12 +72,21 @@ fn sine(bearing_mrad: i16) -> i32 {
     if bearing_mrad < 0 { -sine } else { sine }
 }
 
+/// Inserts an angle into a slice in ascending order; the largest one drops out.
+pub(crate) fn insert_ascending(angles_mrad: &mut [i16], mut angle_mrad: i16) {
+    for slot in angles_mrad {
+        if angle_mrad < *slot {
+            core::mem::swap(slot, &mut angle_mrad);
+        }
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
 
     #[test]
-    fn the_turn_between_bearings_goes_the_short_way_round() {
+    fn the_angle_between_two_bearings_is_at_most_half_a_turn() {
         assert_eq!(turn_mrad(3142, -3142), 0);
         assert_eq!(turn_mrad(3000, -3000), 284);
         assert_eq!(turn_mrad(-3000, 3000), -284);
@@ -76,11 +94,11 @@ mod tests {
     }
 
     #[test]
-    fn a_turned_bearing_stays_within_half_a_turn() {
-        assert_eq!(turned(3000, 284), -3000);
-        assert_eq!(turned(-3000, -284), 3000);
-        assert_eq!(turned(100, -300), -200);
-        assert_eq!(turned(-3142, -3142), 0);
+    fn a_rotated_bearing_is_within_half_a_turn() {
+        assert_eq!(rotated(3000, 284), -3000);
+        assert_eq!(rotated(-3000, -284), 3000);
+        assert_eq!(rotated(100, -300), -200);
+        assert_eq!(rotated(-3142, -3142), 0);
     }
 
     #[test]

@@ -1,0 +1,386 @@
+//! Drives from one place to the next: along an edge, to the meet point, and out by the chosen exit.
+
+use super::rotation::RotationEstimate;
+use super::voronoi::{Sector, edge_heading_mrad, meet_point_offset_mm};
+use super::{DriveConfig, DriveConfigError, VelocityCommand};
+use crate::bearing::{HALF_TURN_MRAD, rotated, turn_mrad};
+use crate::place::{Obstacle, Obstacles, Openings, RingScan};
+use crate::ring::Echo;
+use crate::{FaultCounters, FaultKind, Turn};
+
+/// An opening is matched to the one of the frame before when its bearing changed by at most this, in milliradians.
+const SAME_OPENING_MRAD: u16 = 700;
+/// The robot faces an exit within this angle of straight ahead, in milliradians. Sensors within it look ahead.
+const FACING_MRAD: i32 = 200;
+/// Where all sensors within [`FACING_MRAD`] are dead, sensors within this angle replace them, in milliradians.
+const FACING_BESIDE_DEAD_MRAD: i32 = 600;
+/// With the sensors ahead dead the robot sways by this angle to either side, in milliradians,
+const SWAY_MRAD: i16 = 260;
+/// for this number of frames each; a power of two.
+const SWAY_FRAMES: u16 = 8;
+/// At a place the planner waits at most this many frames for as many openings as the detector counted.
+const CHOOSE_FRAMES: u16 = 12;
+/// For this many frames after departing the robot still counts as at the place: an obstacle that is hidden for a moment
+/// must not make another place.
+const DEPART_FRAMES: u16 = 8;
+/// Limit of the heading along an edge, in milliradians: an edge is smooth, and an intermittent echo must not turn the robot
+/// round.
+const MAX_HEADING_MRAD: i16 = 500;
+/// Minimum speed near a meet point, in thousandths.
+const APPROACH_PERMILLE: u16 = 250;
+/// Distance from a meet point at which the speed begins to fall, in millimetres.
+const BRAKE_MM: u16 = 400;
+
+/// What the drive is doing.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[repr(u8)]
+#[non_exhaustive]
+pub enum DriveState {
+    /// It drives along an edge of the Voronoi graph, or searches for one.
+    FollowEdge = 0,
+    /// It approaches a meet point and waits for the detector to confirm it.
+    Approach = 1,
+    /// It stands at a confirmed place and finds its exits.
+    ChooseExit = 2,
+    /// It turns in place to the chosen exit.
+    TurnToExit = 3,
+    /// It drives out of a place.
+    Depart = 4,
+    /// It stands at a place because it has no goal.
+    Stopped = 5,
+    /// It turns in place, away from an obstacle or after it lost the graph, to the direction with the most room.
+    Recover = 6,
+}
+
+/// The exits of the place where the robot stands, numbered counter-clockwise.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Exits {
+    /// How many there are, at least 1.
+    pub(super) count: u8,
+    /// Whether exit 0 is known to be the one by which the robot entered.
+    pub(super) is_entry_first: bool,
+}
+
+/// How the robot left the place that was reported last. `Option<Turn>` is not all zero, so a `static` robot would not be in
+/// `.bss`.
+#[derive(Clone, Copy, Debug)]
+enum Left {
+    Unknown,
+    Back,
+    On,
+}
+
+/// A state machine with one step for each ring frame. Memory: some 60 bytes.
+#[derive(Clone, Debug)]
+pub(super) struct LocalPlanner {
+    config: DriveConfig,
+    state: DriveState,
+    /// Ring frames in this state.
+    frames: u16,
+    /// Bearing of the exit by which the robot entered the place.
+    entry_mrad: i16,
+    /// Bearing of the chosen exit, or of the direction to recover to.
+    target_mrad: i16,
+    rotation: RotationEstimate,
+    /// The degree of the place by the detector.
+    degree: Option<u8>,
+    left: Left,
+    faults: FaultCounters,
+}
+
+impl LocalPlanner {
+    pub(super) const fn new() -> Self {
+        Self {
+            config: DriveConfig::UNSET,
+            state: DriveState::FollowEdge,
+            frames: 0,
+            entry_mrad: 0,
+            target_mrad: 0,
+            rotation: RotationEstimate::new(),
+            degree: None,
+            left: Left::Unknown,
+            faults: FaultCounters::new(),
+        }
+    }
+
+    pub(super) fn start(&mut self, config: DriveConfig) {
+        *self = Self { config, ..Self::new() };
+    }
+
+    pub(super) fn set_speed(&mut self, speed_permille: u16) -> Result<(), DriveConfigError> {
+        let config = DriveConfig { speed_permille, ..self.config };
+        config.check()?;
+        self.config = config;
+        Ok(())
+    }
+
+    pub(super) const fn state(&self) -> DriveState {
+        self.state
+    }
+
+    /// Whether the robot has not left the place that was reported last.
+    pub(super) const fn holds_place(&self) -> bool {
+        match self.state {
+            DriveState::ChooseExit | DriveState::TurnToExit | DriveState::Stopped => true,
+            DriveState::Depart => self.frames < DEPART_FRAMES,
+            DriveState::FollowEdge | DriveState::Approach | DriveState::Recover => false,
+        }
+    }
+
+    pub(super) const fn turn(&self) -> Option<Turn> {
+        match self.left {
+            Left::Unknown => None,
+            Left::Back => Some(Turn::Back),
+            Left::On => Some(Turn::On),
+        }
+    }
+
+    pub(super) const fn faults(&self) -> &FaultCounters {
+        &self.faults
+    }
+
+    /// The detector has reported a place of this degree.
+    pub(super) fn arrive(&mut self, degree: Option<u8>) {
+        self.degree = degree;
+        self.left = Left::Unknown;
+        self.enter(DriveState::ChooseExit);
+    }
+
+    /// The goal has changed: a stopped robot chooses an exit again.
+    pub(super) fn reconsider(&mut self) {
+        if self.state == DriveState::Stopped {
+            self.enter(DriveState::ChooseExit);
+        }
+    }
+
+    /// Discards what is known of the present place and edge.
+    pub(super) fn forget_edge(&mut self) {
+        self.left = Left::Unknown;
+        self.enter(DriveState::FollowEdge);
+    }
+
+    /// Processes the next frame. `is_at_place` is [`PlaceDetector::is_at_place`](crate::place::PlaceDetector::is_at_place);
+    /// `choose` returns the number of the exit to take, `None` to stop.
+    pub(super) fn advance<const SONARS: usize>(
+        &mut self,
+        scan: &RingScan<'_, SONARS>,
+        is_at_place: bool,
+        choose: impl FnOnce(Exits) -> Option<u8>,
+    ) -> VelocityCommand {
+        self.frames = self.frames.saturating_add(1);
+        let obstacles = scan.obstacles();
+        self.rotation.update(&obstacles);
+        match self.state {
+            DriveState::FollowEdge => self.follow_edge(scan, &obstacles, is_at_place),
+            DriveState::Approach => self.approach(scan, &obstacles),
+            DriveState::ChooseExit => self.choose_exit(scan, &obstacles, choose),
+            DriveState::TurnToExit => self.turn_to_exit(scan, &obstacles),
+            DriveState::Depart => self.depart(scan, &obstacles, is_at_place),
+            DriveState::Recover => self.recover(scan),
+            DriveState::Stopped => VelocityCommand::STOP,
+        }
+    }
+
+    fn enter(&mut self, state: DriveState) {
+        self.state = state;
+        self.frames = 0;
+    }
+
+    fn is_timed_out(&self) -> bool {
+        self.frames > self.config.timeout_frames
+    }
+
+    fn follow_edge<const SONARS: usize>(
+        &mut self,
+        scan: &RingScan<'_, SONARS>,
+        obstacles: &Obstacles,
+        is_at_place: bool,
+    ) -> VelocityCommand {
+        if !is_at_place && obstacles.spread_mm().is_some_and(|spread_mm| spread_mm <= scan.equidistance_mm()) {
+            self.entry_mrad = HALF_TURN_MRAD;
+            self.enter(DriveState::Approach);
+            return self.approach(scan, obstacles);
+        }
+        self.drive(scan, Sector::EDGE, obstacles.spread_mm())
+    }
+
+    fn approach<const SONARS: usize>(&mut self, scan: &RingScan<'_, SONARS>, obstacles: &Obstacles) -> VelocityCommand {
+        if self.is_timed_out() {
+            return self.give_up(scan);
+        }
+        let limit_mm = scan.equidistance_mm().saturating_mul(2);
+        if obstacles.spread_mm().is_some_and(|spread_mm| spread_mm > limit_mm) {
+            self.enter(DriveState::FollowEdge);
+            return self.follow_edge(scan, obstacles, false);
+        }
+        self.track_entry(&scan.openings(obstacles));
+        match meet_point_offset_mm(obstacles) {
+            Some(offset) if offset.length() > i32::from(self.config.arrival_tolerance_mm) => {
+                let heading_mrad = offset.bearing_mrad();
+                // A meet point behind has been passed, and a turn towards it would lose the bearing of the entry.
+                if i32::from(heading_mrad).abs() > 1571 {
+                    return VelocityCommand::STOP;
+                }
+                let distance_mm = offset.length().clamp(0, i32::from(BRAKE_MM)) as u16;
+                VelocityCommand { heading_mrad, speed_permille: self.speed_permille_at(distance_mm) }
+            }
+            // The third obstacle may be in front of a dead sensor: turn until another one sees it.
+            None if self.frames > CHOOSE_FRAMES && scan.echoes().any(|(echo, _)| echo == Echo::Dead) => {
+                VelocityCommand { heading_mrad: FACING_MRAD as i16, speed_permille: 0 }
+            }
+            _ => VelocityCommand::STOP,
+        }
+    }
+
+    fn choose_exit<const SONARS: usize>(
+        &mut self,
+        scan: &RingScan<'_, SONARS>,
+        obstacles: &Obstacles,
+        choose: impl FnOnce(Exits) -> Option<u8>,
+    ) -> VelocityCommand {
+        let openings = scan.openings(obstacles);
+        self.track_entry(&openings);
+        let bearings_mrad = openings.bearings_mrad();
+        let count = bearings_mrad.len();
+        let agrees = self.degree.is_none_or(|degree| usize::from(degree) == count);
+        if count == 0 && self.frames > CHOOSE_FRAMES {
+            return self.give_up(scan);
+        }
+        if count == 0 || !agrees && self.frames <= CHOOSE_FRAMES {
+            return VelocityCommand::STOP;
+        }
+        let entry = openings.nearest(self.entry_mrad, SAME_OPENING_MRAD).map(|(index, _)| index);
+        let Some(exit) = choose(Exits { count: count as u8, is_entry_first: entry.is_some() }) else {
+            self.enter(DriveState::Stopped);
+            return VelocityCommand::STOP;
+        };
+        self.left = match entry {
+            None => Left::Unknown,
+            Some(_) if exit == 0 => Left::Back,
+            Some(_) => Left::On,
+        };
+        let index = (entry.unwrap_or(0) + usize::from(exit)).checked_rem(count).unwrap_or(0);
+        self.target_mrad = bearings_mrad.get(index).copied().unwrap_or(0);
+        self.enter(DriveState::TurnToExit);
+        self.turn_to_exit(scan, obstacles)
+    }
+
+    fn turn_to_exit<const SONARS: usize>(
+        &mut self,
+        scan: &RingScan<'_, SONARS>,
+        obstacles: &Obstacles,
+    ) -> VelocityCommand {
+        if self.is_timed_out() {
+            return self.give_up(scan);
+        }
+        // An exit that this frame does not show is where the rotation of the ring brings it.
+        let expected_mrad = rotated(self.target_mrad, self.rotation.rotation_mrad());
+        let seen = scan.openings(obstacles).nearest(expected_mrad, SAME_OPENING_MRAD);
+        let target_mrad = seen.map_or(expected_mrad, |(_, target_mrad)| target_mrad);
+        // Straight behind, noise must not reverse the direction of the turn.
+        let is_behind = turn_mrad(HALF_TURN_MRAD, target_mrad).abs() < i32::from(SAME_OPENING_MRAD);
+        let is_reversed = (target_mrad < 0) != (self.target_mrad < 0);
+        if !(is_behind && is_reversed) {
+            self.target_mrad = target_mrad;
+        }
+        // With the sensors ahead dead the exit is not seen, and the estimate has to do.
+        let facing_mrad = facing_mrad(scan);
+        let is_certain = seen.is_some() || facing_mrad > FACING_MRAD;
+        if is_certain && i32::from(self.target_mrad).abs() <= facing_mrad {
+            self.enter(DriveState::Depart);
+            return self.drive(scan, Sector::EXIT, None);
+        }
+        VelocityCommand { heading_mrad: self.target_mrad, speed_permille: 0 }
+    }
+
+    fn depart<const SONARS: usize>(
+        &mut self,
+        scan: &RingScan<'_, SONARS>,
+        obstacles: &Obstacles,
+        is_at_place: bool,
+    ) -> VelocityCommand {
+        if self.is_timed_out() {
+            return self.give_up(scan);
+        }
+        if !is_at_place {
+            self.enter(DriveState::FollowEdge);
+            return self.follow_edge(scan, obstacles, is_at_place);
+        }
+        self.drive(scan, Sector::EXIT, None)
+    }
+
+    fn recover<const SONARS: usize>(&mut self, scan: &RingScan<'_, SONARS>) -> VelocityCommand {
+        // Without odometry, a free range ahead is the only sign that the turn is complete.
+        let limit_mm = self.config.clearance_mm.saturating_mul(2);
+        let is_free = nearest_ahead(scan).is_none_or(|ahead| ahead.range_mm > limit_mm);
+        if is_free && self.frames > 5 || self.is_timed_out() {
+            self.enter(DriveState::FollowEdge);
+        }
+        VelocityCommand { heading_mrad: if self.target_mrad < 0 { -1571 } else { 1571 }, speed_permille: 0 }
+    }
+
+    /// Records that the robot is lost, and turns to the longest range.
+    fn give_up<const SONARS: usize>(&mut self, scan: &RingScan<'_, SONARS>) -> VelocityCommand {
+        self.faults.record(FaultKind::DriveLost);
+        self.left = Left::Unknown;
+        let longest = scan.echoes().max_by_key(|(echo, _)| match echo {
+            Echo::Dead => 0,
+            Echo::Range { range_mm } => *range_mm,
+            Echo::Silence => u16::MAX,
+        });
+        self.target_mrad = longest.map_or(0, |(_, bearing_mrad)| bearing_mrad);
+        self.enter(DriveState::Recover);
+        VelocityCommand { heading_mrad: self.target_mrad, speed_permille: 0 }
+    }
+
+    /// Drives along the edge between the obstacles in a sector, more slowly with a smaller spread.
+    fn drive<const SONARS: usize>(
+        &mut self,
+        scan: &RingScan<'_, SONARS>,
+        sector: Sector,
+        spread_mm: Option<u16>,
+    ) -> VelocityCommand {
+        if nearest_ahead(scan).is_some_and(|ahead| ahead.range_mm < self.config.clearance_mm) {
+            return self.give_up(scan);
+        }
+        let heading_mrad = edge_heading_mrad(scan, sector, self.config.look_ahead_mm).unwrap_or(0);
+        let heading_mrad = heading_mrad.clamp(-MAX_HEADING_MRAD, MAX_HEADING_MRAD).saturating_add(self.sway_mrad(scan));
+        VelocityCommand { heading_mrad, speed_permille: self.speed_permille_at(spread_mm.unwrap_or(u16::MAX)) }
+    }
+
+    /// With the sensors ahead dead, a swaying robot measures the range ahead with those beside them.
+    fn sway_mrad<const SONARS: usize>(&self, scan: &RingScan<'_, SONARS>) -> i16 {
+        match (facing_mrad(scan) > FACING_MRAD, self.frames & SWAY_FRAMES == 0) {
+            (false, _) => 0,
+            (true, true) => SWAY_MRAD,
+            (true, false) => -SWAY_MRAD,
+        }
+    }
+
+    /// The speed at this distance from a meet point.
+    fn speed_permille_at(&self, distance_mm: u16) -> u16 {
+        let full = self.config.speed_permille;
+        let share = u32::from(distance_mm.min(BRAKE_MM)) * u32::from(full) / u32::from(BRAKE_MM);
+        (share as u16).max(APPROACH_PERMILLE.min(full))
+    }
+
+    /// Updates the bearing of the entry while the robot turns a little.
+    fn track_entry(&mut self, openings: &Openings) {
+        if let Some((_, entry_mrad)) = openings.nearest(self.entry_mrad, SAME_OPENING_MRAD) {
+            self.entry_mrad = entry_mrad;
+        }
+    }
+}
+
+/// Half-width of the sector whose sensors measure the range ahead: wider where all of those straight ahead are dead.
+fn facing_mrad<const SONARS: usize>(scan: &RingScan<'_, SONARS>) -> i32 {
+    let faces = |bearing_mrad: i16| i32::from(bearing_mrad).abs() < FACING_MRAD;
+    let is_live = scan.echoes().any(|(echo, bearing_mrad)| echo != Echo::Dead && faces(bearing_mrad));
+    if is_live { FACING_MRAD } else { FACING_BESIDE_DEAD_MRAD }
+}
+
+/// The nearest obstacle ahead.
+fn nearest_ahead<const SONARS: usize>(scan: &RingScan<'_, SONARS>) -> Option<Obstacle> {
+    let within_mrad = facing_mrad(scan);
+    scan.nearest(|bearing_mrad| i32::from(bearing_mrad).abs() < within_mrad)
+}

@@ -1,0 +1,138 @@
+//! Where the generalised Voronoi graph is, from one scan: the heading along an edge, and the position of a meet point.
+//!
+//! An edge is the set of points where the two closest obstacles are equidistant (Choset and Nagatani; section IV.A of the
+//! paper). With unit vectors u and v towards obstacles at ranges r and s, a displacement δ of the robot changes r − s by
+//! −(u − v) · δ. The edge is therefore perpendicular to u − v, and a meet point is the δ that makes both differences 0.
+
+use crate::bearing::{UNIT, Vector, unit};
+use crate::place::{Obstacle, Obstacles, RingScan};
+
+/// The sector in which the obstacle on the left is searched, counter-clockwise from the heading; mirrored on the right.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Sector {
+    from_mrad: i16,
+    to_mrad: i16,
+}
+
+impl Sector {
+    /// 20° to 160°: the obstacles beside an edge.
+    pub(super) const EDGE: Self = Self { from_mrad: 350, to_mrad: 2790 };
+    /// 20° to 115°: the two obstacles beside an exit of a meet point, without those behind.
+    pub(super) const EXIT: Self = Self { from_mrad: 350, to_mrad: 2010 };
+}
+
+/// Heading to the point of the edge that is `look_ahead_mm` ahead, between the closest obstacles on the left and on the
+/// right. With an obstacle on one side only, the heading parallel to it; `None` without any.
+pub(super) fn edge_heading_mrad<const SONARS: usize>(
+    scan: &RingScan<'_, SONARS>,
+    sector: Sector,
+    look_ahead_mm: u16,
+) -> Option<i16> {
+    let within = |bearing_mrad: i16| (sector.from_mrad..=sector.to_mrad).contains(&bearing_mrad);
+    let left = scan.nearest(within);
+    let right = scan.nearest(|bearing_mrad| within(bearing_mrad.saturating_neg()));
+    match (left, right) {
+        (Some(left), Some(right)) => Some(heading_between_mrad(left, right, look_ahead_mm)),
+        (Some(left), None) => Some(left.bearing_mrad.saturating_sub(1571)),
+        (None, Some(right)) => Some(right.bearing_mrad.saturating_add(1571)),
+        (None, None) => None,
+    }
+}
+
+/// Heading to the point of the edge between two obstacles that is `look_ahead_mm` ahead.
+fn heading_between_mrad(left: Obstacle, right: Obstacle, look_ahead_mm: u16) -> i16 {
+    let (to_left, to_right) = (unit(left.bearing_mrad), unit(right.bearing_mrad));
+    let apart = Vector { x: to_left.x - to_right.x, y: to_left.y - to_right.y };
+    let length = apart.length();
+    // Perpendicular to the difference; of the two directions, the one with the left obstacle on the left.
+    let along = Vector { x: apart.y, y: -apart.x };
+    let nearer_right_mm = i32::from(left.range_mm) - i32::from(right.range_mm);
+    // A displacement of 1 mm to the left reduces the difference by |u − v|.
+    let aside_mm = nearer_right_mm.saturating_mul(UNIT).checked_div(length).unwrap_or(0);
+    let look_ahead_mm = i32::from(look_ahead_mm);
+    let aside_mm = aside_mm.clamp(-look_ahead_mm, look_ahead_mm);
+    let point = |along: i32, aside: i32| (along * look_ahead_mm + aside * aside_mm) / 64;
+    Vector { x: point(along.x, apart.x), y: point(along.y, apart.y) }.bearing_mrad()
+}
+
+/// Displacement in millimetres to the point that is equidistant from the three closest obstacles: one step of Newton's
+/// method. `None` with fewer than three obstacles, or when their bearings do not determine the point.
+pub(super) fn meet_point_offset_mm(obstacles: &Obstacles) -> Option<Vector> {
+    let mut obstacles = obstacles.iter();
+    let (first, second, third) = (obstacles.next()?, obstacles.next()?, obstacles.next()?);
+    let difference = |other: &Obstacle| {
+        let (u, v) = (unit(first.bearing_mrad), unit(other.bearing_mrad));
+        (u.x - v.x, u.y - v.y, i32::from(first.range_mm) - i32::from(other.range_mm))
+    };
+    // Two equations (u − v) · δ = r − s, solved by Cramer's rule.
+    let ((a, b, p), (c, d, q)) = (difference(second), difference(third));
+    let determinant = i64::from(a) * i64::from(d) - i64::from(b) * i64::from(c);
+    if determinant.abs() < i64::from(UNIT * UNIT / 8) {
+        return None;
+    }
+    let solve = |numerator: i64| {
+        let mm = (numerator * i64::from(UNIT)).checked_div(determinant).unwrap_or(0);
+        mm.clamp(-10_000, 10_000) as i32
+    };
+    let x = i64::from(p) * i64::from(d) - i64::from(b) * i64::from(q);
+    let y = i64::from(a) * i64::from(q) - i64::from(p) * i64::from(c);
+    Some(Vector { x: solve(x), y: solve(y) })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::place::{PlaceConfig, PlaceDetector};
+    use crate::ring::{Echo, RingFrame, RingGeometry};
+
+    /// A detector whose scan has these ranges, by sensor of an even ring; the other sensors receive no echo.
+    fn detector(ranges_mm: &[(usize, u16)]) -> PlaceDetector<16> {
+        let mut frame = RingFrame { echoes: [Echo::Silence; 16] };
+        for &(sensor, range_mm) in ranges_mm {
+            frame.echoes[sensor] = Echo::Range { range_mm };
+        }
+        let mut detector = PlaceDetector::new();
+        detector.start(PlaceConfig::DEFAULT, RingGeometry::even()).unwrap();
+        detector.observe(&frame);
+        detector
+    }
+
+    fn edge(ranges_mm: &[(usize, u16)]) -> Option<i16> {
+        edge_heading_mrad(&detector(ranges_mm).scan(), Sector::EDGE, 400)
+    }
+
+    #[test]
+    fn on_the_axis_of_a_corridor_the_edge_is_straight_ahead() {
+        let heading_mrad = edge(&[(4, 800), (12, 800)]).unwrap();
+        assert!(heading_mrad.abs() <= 5, "{heading_mrad}");
+    }
+
+    #[test]
+    fn off_the_axis_the_edge_is_towards_the_farther_wall() {
+        // 100 mm right of the axis: the point 100 mm to the left and 400 mm ahead has a bearing of 245 mrad.
+        let heading_mrad = edge(&[(4, 900), (12, 700)]).unwrap();
+        assert!((heading_mrad - 245).abs() <= 8, "{heading_mrad}");
+    }
+
+    #[test]
+    fn with_a_heading_off_the_axis_the_edge_is_parallel_to_the_walls() {
+        let heading_mrad = edge(&[(5, 800), (13, 800)]).unwrap();
+        assert!((heading_mrad - 393).abs() <= 8, "{heading_mrad}");
+        let heading_mrad = edge(&[(13, 800)]).unwrap();
+        assert!((heading_mrad - 393).abs() <= 8, "{heading_mrad}");
+        assert_eq!(edge(&[]), None);
+    }
+
+    #[test]
+    fn the_meet_point_of_a_dead_end_is_equidistant_from_its_three_walls() {
+        let obstacles = detector(&[(0, 900), (4, 820), (12, 780)]).scan().obstacles();
+        let Vector { x, y } = meet_point_offset_mm(&obstacles).unwrap();
+        assert!((x - 100).abs() <= 3 && (y - 20).abs() <= 3, "{x} {y}");
+    }
+
+    #[test]
+    fn two_obstacles_have_no_meet_point() {
+        let obstacles = detector(&[(4, 820), (12, 780)]).scan().obstacles();
+        assert_eq!(meet_point_offset_mm(&obstacles), None);
+    }
+}

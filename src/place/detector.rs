@@ -1,0 +1,293 @@
+//! Confirms meet points over several frames, and reports each of them once.
+
+use super::scan::{MeetPoint, RingScan};
+use super::smoothing::{DEAD_MM, RangeSmoother, SILENT_MM, bridge_dead_sensors};
+use super::{Fingerprint, PlaceConfig, PlaceConfigError};
+use crate::ring::{Echo, RingFrame, RingGeometry};
+use crate::{FaultCounters, FaultKind};
+
+/// The radius is the mean over at most this many frames.
+const AVERAGED_FRAMES: usize = 8;
+/// Only frames whose spread is at most this much above the smallest one are averaged, in millimetres.
+const AVERAGED_SPREAD_MM: u16 = 30;
+
+/// A place that the robot has visited: a meet point of the Voronoi graph.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Place {
+    /// Radius of the largest obstacle-free disc around the meet point.
+    pub fingerprint: Fingerprint,
+    /// Index of the frame in which the robot was closest to the meet point, counted from 0 since the detector's start.
+    pub frame_index: u32,
+    /// Number of openings between the equidistant obstacles, 1 to 6, 1 at a dead end; `None` when fewer than three
+    /// quarters of the averaged frames agree.
+    ///
+    /// This is the degree of the vertex. An edge that ends within 1.6 times the radius is not counted, nor is one between
+    /// two obstacles closer in bearing than `separation_mrad`.
+    pub degree: Option<u8>,
+    /// Smallest spread of the meet point's frames, in millimetres: 0 is an ideal meet point.
+    pub spread_mm: u16,
+}
+
+/// A frame that shows a meet point.
+#[derive(Clone, Copy, Debug)]
+struct Sighting {
+    meet_point: MeetPoint,
+    frame_index: u32,
+}
+
+impl Sighting {
+    const UNSET: Self = Self { meet_point: MeetPoint { spread_mm: 0, radius_mm: 0, openings: 0 }, frame_index: 0 };
+    /// Sorts behind every real sighting.
+    const NONE: Self =
+        Self { meet_point: MeetPoint { spread_mm: u16::MAX, radius_mm: 0, openings: 0 }, frame_index: 0 };
+}
+
+/// Detects places in the frames of a ring of `SONARS` sensors.
+///
+/// Ranges are measured from the robot's centre: a ring of sensors on its rim adds the radius of the ring.
+/// Memory: about `12 · SONARS + 160` bytes. Time for each frame: at most six passes over the ring, `O(SONARS)` each; where most
+/// sensors are dead, up to `O(SONARS²)`.
+#[derive(Clone, Debug)]
+pub struct PlaceDetector<const SONARS: usize> {
+    config: PlaceConfig,
+    /// Index in the frame of each sensor, in ascending order of bearing.
+    sensor_order: [u16; SONARS],
+    /// The bearings in that order.
+    geometry: RingGeometry<SONARS>,
+    is_started: bool,
+    is_blind: bool,
+    smoother: RangeSmoother<SONARS>,
+    /// The newest frame, smoothed.
+    smooth_mm: [u16; SONARS],
+    frame_index: u32,
+    /// Whether the robot is still at the place that was reported last.
+    is_at_place: bool,
+    /// Frames that showed the current meet point.
+    sightings: u8,
+    /// Frames that contradict the present state minus frames that confirm it, at least 0.
+    contrary_frames: u8,
+    /// The sightings with the smallest spread, best first.
+    best: [Sighting; AVERAGED_FRAMES],
+    faults: FaultCounters,
+}
+
+impl<const SONARS: usize> PlaceDetector<SONARS> {
+    /// Creates a detector that is not started. It is all zero, so a `static` of it is in `.bss`.
+    pub const fn new() -> Self {
+        Self {
+            config: PlaceConfig::UNSET,
+            sensor_order: [0; SONARS],
+            geometry: RingGeometry { bearings_mrad: [0; SONARS] },
+            is_started: false,
+            is_blind: false,
+            smoother: RangeSmoother::new(),
+            smooth_mm: [DEAD_MM; SONARS],
+            frame_index: 0,
+            is_at_place: false,
+            sightings: 0,
+            contrary_frames: 0,
+            best: [Sighting::UNSET; AVERAGED_FRAMES],
+            faults: FaultCounters::new(),
+        }
+    }
+
+    /// Resets the detector and starts it at frame 0.
+    ///
+    /// The sensors may be in any order of bearing, and several may have the same bearing.
+    ///
+    /// # Errors
+    /// The first setting that is out of its range; the detector does not change then.
+    pub fn start(&mut self, config: PlaceConfig, geometry: RingGeometry<SONARS>) -> Result<(), PlaceConfigError> {
+        config.check(SONARS)?;
+        if geometry.bearings_mrad.iter().any(|bearing_mrad| !(-3142..=3142).contains(bearing_mrad)) {
+            return Err(PlaceConfigError::Bearing);
+        }
+        self.config = config;
+        for (sensor, bearing_mrad) in (0_u16..).zip(geometry.bearings_mrad) {
+            let before = (0_u16..).zip(geometry.bearings_mrad).filter(|&(other, other_mrad)| {
+                other_mrad < bearing_mrad || other_mrad == bearing_mrad && other < sensor
+            });
+            let position = before.count();
+            if let (Some(index), Some(sorted_mrad)) =
+                (self.sensor_order.get_mut(position), self.geometry.bearings_mrad.get_mut(position))
+            {
+                (*index, *sorted_mrad) = (sensor, bearing_mrad);
+            }
+        }
+        self.is_started = true;
+        self.smooth_mm = [DEAD_MM; SONARS];
+        self.smoother.clear();
+        self.frame_index = 0;
+        self.is_at_place = false;
+        self.faults = FaultCounters::new();
+        self.forget_sightings();
+        Ok(())
+    }
+
+    /// Changes the settings and continues.
+    ///
+    /// # Errors
+    /// The first setting that is out of its range; the detector does not change then.
+    pub fn set_config(&mut self, config: PlaceConfig) -> Result<(), PlaceConfigError> {
+        config.check(SONARS)?;
+        self.config = config;
+        Ok(())
+    }
+
+    /// Processes the next frame, and returns a place when one is complete.
+    ///
+    /// Each visit of a place is reported once, some frames after the robot was closest to it. Before
+    /// [`start`](Self::start) this does nothing.
+    pub fn observe(&mut self, frame: &RingFrame<SONARS>) -> Option<Place> {
+        if !self.is_started {
+            return None;
+        }
+        let frame_index = self.frame_index;
+        self.frame_index = self.frame_index.saturating_add(1);
+        let ranges_mm = self.valid_ranges_mm(frame);
+        self.smooth_mm = self.smoother.update(ranges_mm);
+        let live = self.smooth_mm.iter().filter(|range_mm| **range_mm != DEAD_MM).count();
+        self.is_blind = live < usize::from(self.config.live_sensors_min);
+        bridge_dead_sensors(&mut self.smooth_mm, &self.geometry, &self.config);
+        if self.is_blind {
+            self.faults.record(FaultKind::RingBlind);
+            return None;
+        }
+        let meet_point = self.scan().meet_point();
+        if self.is_at_place {
+            self.wait_for_departure(meet_point);
+            return None;
+        }
+        self.confirm(Sighting { meet_point, frame_index })
+    }
+
+    /// Returns the newest frame, smoothed.
+    pub const fn scan(&self) -> RingScan<'_, SONARS> {
+        RingScan {
+            ranges_mm: &self.smooth_mm,
+            geometry: &self.geometry,
+            separation_mrad: self.config.separation_mrad,
+            equidistance_mm: self.config.equidistance_mm,
+        }
+    }
+
+    /// Whether the newest frame has fewer live sensors than `live_sensors_min`: too few to detect a place or to drive.
+    pub const fn is_blind(&self) -> bool {
+        self.is_blind
+    }
+
+    /// Whether the robot is still at the place that was reported last.
+    pub const fn is_at_place(&self) -> bool {
+        self.is_at_place
+    }
+
+    /// Tells the detector that the robot has not left the place that was reported last.
+    ///
+    /// Call it after each frame while the robot turns in place: the ranges then change without a departure.
+    pub const fn hold_place(&mut self) {
+        if self.is_at_place {
+            self.contrary_frames = 0;
+        }
+    }
+
+    /// Faults since the start: blind frames, ranges out of range, radii that no fingerprint represents.
+    pub const fn faults(&self) -> &FaultCounters {
+        &self.faults
+    }
+
+    /// The ranges of a frame in ascending order of bearing, each checked against the limits of the configuration.
+    fn valid_ranges_mm(&mut self, frame: &RingFrame<SONARS>) -> [u16; SONARS] {
+        let mut ranges_mm = [DEAD_MM; SONARS];
+        for (range_mm, &sensor) in ranges_mm.iter_mut().zip(&self.sensor_order) {
+            *range_mm = match frame.echoes.get(usize::from(sensor)).copied().unwrap_or(Echo::Dead) {
+                Echo::Dead => DEAD_MM,
+                Echo::Silence => SILENT_MM,
+                Echo::Range { range_mm } if range_mm < self.config.range_min_mm => {
+                    self.faults.record(FaultKind::SonarOutOfRange);
+                    DEAD_MM
+                }
+                Echo::Range { range_mm } if range_mm > self.config.range_max_mm => SILENT_MM,
+                Echo::Range { range_mm } => range_mm,
+            };
+        }
+        ranges_mm
+    }
+
+    /// At a reported place: counts the frames that show a departure.
+    fn wait_for_departure(&mut self, meet_point: MeetPoint) {
+        if meet_point.spread_mm >= self.config.leave_mm {
+            self.contrary_frames = self.contrary_frames.saturating_add(1);
+        } else {
+            self.contrary_frames = self.contrary_frames.saturating_sub(1);
+        }
+        if self.contrary_frames >= self.config.leave_frames {
+            self.is_at_place = false;
+            self.forget_sightings();
+        }
+    }
+
+    /// Between places: collects the frames that show a meet point, and returns the place when it is complete.
+    fn confirm(&mut self, sighting: Sighting) -> Option<Place> {
+        if sighting.meet_point.spread_mm <= self.config.equidistance_mm {
+            self.sightings = self.sightings.saturating_add(1);
+            self.contrary_frames = self.contrary_frames.saturating_sub(1);
+            self.insert(sighting);
+        } else if self.sightings > 0 {
+            self.contrary_frames = self.contrary_frames.saturating_add(1);
+        }
+        let is_over = self.contrary_frames >= self.config.leave_frames;
+        if self.sightings < self.config.confirm_frames {
+            if is_over {
+                self.forget_sightings();
+            }
+            return None;
+        }
+        if !is_over && self.sightings < self.config.settle_frames {
+            return None;
+        }
+        let place = self.place();
+        self.is_at_place = true;
+        self.forget_sightings();
+        place
+    }
+
+    /// Inserts a sighting into the best ones, in ascending order of spread.
+    fn insert(&mut self, mut sighting: Sighting) {
+        for slot in &mut self.best {
+            if sighting.meet_point.spread_mm < slot.meet_point.spread_mm {
+                core::mem::swap(slot, &mut sighting);
+            }
+        }
+    }
+
+    fn forget_sightings(&mut self) {
+        self.best = [Sighting::NONE; AVERAGED_FRAMES];
+        self.sightings = 0;
+        self.contrary_frames = 0;
+    }
+
+    /// The mean of the best sightings.
+    fn place(&mut self) -> Option<Place> {
+        let [best, ..] = self.best;
+        let limit_mm = best.meet_point.spread_mm.saturating_add(AVERAGED_SPREAD_MM);
+        let meet_points = self.best.iter().map(|sighting| sighting.meet_point);
+        let close = meet_points.filter(|meet_point| meet_point.spread_mm <= limit_mm);
+        let (count, sum_mm) = close.clone().fold((0u32, 0u32), |(count, sum_mm), meet_point| {
+            (count.saturating_add(1), sum_mm.saturating_add(u32::from(meet_point.radius_mm)))
+        });
+        let radius_mm = sum_mm.saturating_add(count / 2).checked_div(count).unwrap_or(0) as u16;
+        let agreed = |degree: u8| close.clone().filter(|meet_point| meet_point.openings == degree).count() as u32;
+        let degree = (1..=6).find(|degree| agreed(*degree).saturating_mul(4) >= count.saturating_mul(3));
+        let Ok(fingerprint) = Fingerprint::from_radius_mm(radius_mm) else {
+            self.faults.record(FaultKind::RadiusOutOfRange);
+            return None;
+        };
+        Some(Place { fingerprint, frame_index: best.frame_index, degree, spread_mm: best.meet_point.spread_mm })
+    }
+}
+
+impl<const SONARS: usize> Default for PlaceDetector<SONARS> {
+    fn default() -> Self {
+        Self::new()
+    }
+}
