@@ -19,8 +19,8 @@ use toposlam::{
     reference,
     ring::{Echo, RingFrame, RingGeometry},
     wire::{
-        Decoder, EncodeError, Encoder, Hello, HelloError, Inbox, JourneyState, MAX_FRAME_BYTES, Message, Outcome,
-        Payload, Picture, Progress, QueueFull, Refusal, Reply, Reporter, Request, ResetCause, Setting, Settings,
+        Decoder, EncodeError, Encoder, GoalState, Hello, HelloError, Inbox, MAX_FRAME_BYTES, MapReplica, Message,
+        Outcome, Payload, Progress, QueueFull, Refusal, Reply, Reporter, Request, ResetCause, Setting, Settings,
         Staging, Version, crc32, map_digest,
     },
 };
@@ -335,7 +335,7 @@ fn snapshot(mapper: &mut reference::RobotMapper) {
 pub(crate) fn wire() {
     static BYTES: ConstStaticCell<[u8; MAX_FRAME_BYTES]> = ConstStaticCell::new([0; MAX_FRAME_BYTES]);
     static DECODER: ConstStaticCell<Decoder> = ConstStaticCell::new(Decoder::new());
-    static PICTURE: ConstStaticCell<Picture<64>> = ConstStaticCell::new(Picture::new());
+    static PICTURE: ConstStaticCell<MapReplica<64>> = ConstStaticCell::new(MapReplica::new());
     let (Some(bytes), Some(decoder), Some(picture)) = (BYTES.try_take(), DECODER.try_take(), PICTURE.try_take()) else {
         return;
     };
@@ -364,7 +364,7 @@ pub(crate) fn wire() {
         black_box(edge);
     }
     black_box((picture.hello(), picture.location(), picture.evidence(), picture.health()));
-    black_box((picture.belief(), picture.worst(), picture.journey()));
+    black_box((picture.belief(), picture.worst(), picture.goal_status()));
     black_box((picture.neighbours(black_box(3)), picture.fault(FaultKind::BusError.opaque())));
     if let Some(Err(error)) = picture.hello().map(|hello: Hello| hello.check()) {
         show::<HelloError>(error);
@@ -424,5 +424,5 @@ pub(crate) fn commands() {
     };
     black_box(settings.with(Setting::Hypotheses(7).opaque(), black_box(10), black_box(16)).is_ok());
     show(ResetCause::from(black_box(3)));
-    show(JourneyState::from(black_box(3)));
+    show(GoalState::from(black_box(3)));
 }
