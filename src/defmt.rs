@@ -10,8 +10,8 @@ use crate::ring::drivers::{
     AddressError, BridgeError, HcSr04ConfigError, MaxBotixConfigError, SonarError, SonarFault, Srf08ConfigError,
 };
 use crate::{
-    ConfigError, FaultCounters, FaultKind, Fingerprint, FingerprintError, NgramError, NgramsFull, Observation, Turn,
-    Update, VerticesFull, WeightFactors, WorstNgram,
+    ConfigError, FaultCounters, FaultKind, Fingerprint, FingerprintError, MapperError, NgramError, NgramsFull,
+    Observation, PaperFactors, RobustFactors, Turn, Update, VertexId, VerticesFull, WeightFactors, WorstNgram,
 };
 
 /// A text for each variant of an enum without fields.
@@ -63,20 +63,20 @@ texts!(PlaceConfigError {
 });
 
 texts!(SonarFault {
-    Silent => "did not answer in time",
-    OutOfRange => "answered with an impossible range",
-    Bus => "could not be reached: bus or pin error",
-    Stuck => "holds its line high before it is asked",
-    Clock => "could not be timed: the clock stands still",
+    Silent => "timed out",
+    OutOfRange => "returned a range outside its limits",
+    Bus => "is not reachable: bus or pin error",
+    Stuck => "holds its echo line high before the trigger",
+    Clock => "cannot be timed: the clock does not advance",
 });
 
 texts!(AddressError {
     From => "from is out of its range",
     To => "to is out of its range",
-    Taken => "a device answers at the wanted address already",
+    Taken => "a device already answers at the new address",
     Silent => "no sensor acknowledged the present address",
     Bus => "bus error",
-    Unchanged => "nothing answers at the wanted address afterwards",
+    Unchanged => "no device answers at the new address afterwards",
 });
 
 texts!(BridgeError {
@@ -93,7 +93,7 @@ texts!(BridgeError {
 texts!(HcSr04ConfigError {
     Trigger => "trigger_us is out of its range",
     Timeout => "rise_timeout_us or echo_timeout_us is out of its range",
-    StandstillPolls => "standstill_polls is out of its range",
+    StoppedClockPolls => "stopped_clock_polls is out of its range",
     SpeedOfSound => "speed_of_sound_m_per_s is out of its range",
     Range => "min_range_mm is above max_range_mm",
 });
@@ -150,17 +150,23 @@ impl Format for Observation {
     }
 }
 
+impl Format for VertexId {
+    fn format(&self, f: Formatter<'_>) {
+        write!(f, "{=u8}", (*self).into());
+    }
+}
+
 impl Format for WorstNgram {
     fn format(&self, f: Formatter<'_>) {
         let Self { distance_mm, newest_age, .. } = self;
-        write!(f, "{=u16} mm from the walk {=[u8]}, {=u16} places ago", distance_mm, self.walk(), newest_age);
+        write!(f, "{=u16} mm from the walk {}, {=u16} places ago", distance_mm, self.walk(), newest_age);
     }
 }
 
 impl Format for Update {
     fn format(&self, f: Formatter<'_>) {
         let Self { place_index, vertex, is_new, consistency_mm, factors, lead_q16, distinct } = self;
-        write!(f, "place {=u32} is vertex {=u8} (new: {=bool})", place_index, vertex, is_new);
+        write!(f, "place {=u32} is vertex {} (new: {=bool})", place_index, vertex, is_new);
         write!(f, ", consistency {=u16} mm, {}", consistency_mm, factors);
         write!(f, ", lead {=i32} / 65536 nats, {=u8} hypotheses", lead_q16, distinct);
     }
@@ -168,8 +174,16 @@ impl Format for Update {
 
 impl Format for WeightFactors {
     fn format(&self, f: Formatter<'_>) {
-        let Self { ln_label_q16, ln_consistency_q16, ln_size_q16 } = self;
-        write!(f, "label {=i32}, consistency {=i32}", ln_label_q16, ln_consistency_q16);
+        let ln_size_q16 = match self {
+            Self::Robust(RobustFactors { ln_labels_q16, ln_moves_q16, ln_size_q16 }) => {
+                write!(f, "labels {=i32}, moves {=i32}", ln_labels_q16, ln_moves_q16);
+                ln_size_q16
+            }
+            Self::Paper(PaperFactors { ln_label_q16, ln_consistency_q16, ln_size_q16 }) => {
+                write!(f, "label {=i32}, consistency {=i32}", ln_label_q16, ln_consistency_q16);
+                ln_size_q16
+            }
+        };
         write!(f, ", size {=i32} / 65536 nats", ln_size_q16);
     }
 }
@@ -215,11 +229,19 @@ impl Format for VerticesFull {
     }
 }
 
-/// What only a firmware with the serial protocol logs.
+impl Format for MapperError {
+    fn format(&self, f: Formatter<'_>) {
+        match self {
+            Self::Place(error) => error.format(f),
+            Self::Filter(error) => error.format(f),
+        }
+    }
+}
+
+/// The types of the serial protocol.
 #[cfg(feature = "wire")]
 mod wire {
     use super::{Format, Formatter, write};
-    use crate::MapperError;
     use crate::wire::{EncodeError, QueueFull};
 
     texts!(EncodeError {
@@ -230,15 +252,6 @@ mod wire {
     impl Format for QueueFull {
         fn format(&self, f: Formatter<'_>) {
             write!(f, "the transmit queue has no room for the message");
-        }
-    }
-
-    impl Format for MapperError {
-        fn format(&self, f: Formatter<'_>) {
-            match self {
-                Self::Place(error) => error.format(f),
-                Self::Filter(error) => error.format(f),
-            }
         }
     }
 }

@@ -15,8 +15,8 @@ use toposlam::{
     FaultCounters, FaultKind,
     ring::RingFrame,
     ring::drivers::{
-        AddressError, BridgeError, FiringPlan, HcSr04Config, HcSr04Ring, MaxBotixConfig, MaxBotixRing, Microseconds,
-        Sc18im700, SonarRing, Srf08Config, Srf08Ring, change_maxbotix_address, change_srf08_address,
+        AddressError, BridgeError, FiringPlan, HcSr04Config, HcSr04Ring, MaxBotixConfig, MaxBotixRing,
+        MicrosecondClock, Sc18im700, SonarRing, Srf08Config, Srf08Ring, change_maxbotix_address, change_srf08_address,
     },
 };
 
@@ -154,7 +154,7 @@ struct HcSr04<'a> {
     rise_timeout_us: u8,
     echo_timeout_us: u16,
     cycle_ms: u8,
-    standstill_polls: u8,
+    stopped_clock_polls: u8,
     speed_m_per_s: Option<u16>,
     range_mm: (u16, u16),
 }
@@ -167,7 +167,7 @@ fn hc_sr04(settings: &HcSr04<'_>, clock: &[u8], answers: &[u8]) {
         rise_timeout_us: settings.rise_timeout_us.into(),
         echo_timeout_us: settings.echo_timeout_us,
         cycle_ms: settings.cycle_ms,
-        standstill_polls: (settings.standstill_polls % 32).into(),
+        stopped_clock_polls: (settings.stopped_clock_polls % 32).into(),
         speed_of_sound_m_per_s: settings.speed_m_per_s.unwrap_or(343),
         min_range_mm,
         max_range_mm,
@@ -175,7 +175,7 @@ fn hc_sr04(settings: &HcSr04<'_>, clock: &[u8], answers: &[u8]) {
     let groups = config.plan.group_count() as u32;
     // The clock goes on by some steps of 8 µs at each poll, or stands still, or goes back; each time for so many polls.
     let steps = (u32::from(config.rise_timeout_us) + u32::from(config.echo_timeout_us)) / 8 + 4;
-    let polls = FRAMES * groups * (3 + (steps + 1) * (u32::from(config.standstill_polls) + 1));
+    let polls = FRAMES * groups * (3 + (steps + 1) * (u32::from(config.stopped_clock_polls) + 1));
     let (pin_calls, clock_calls) = (Budget::of(u32::MAX), Budget::of(polls));
     let pins = std::array::from_fn(|sensor| {
         let pin = || Answers { next: sensor, ..Answers::new(answers, &pin_calls) };
@@ -408,7 +408,7 @@ struct Clock<'a> {
     now_us: u32,
 }
 
-impl Microseconds for Clock<'_> {
+impl MicrosecondClock for Clock<'_> {
     fn now_us(&mut self) -> u32 {
         self.answers.budget.spend();
         let step = self.answers.byte();

@@ -33,7 +33,7 @@ use toposlam::{
     persist::store::{BootPolicy, Store},
     reference::{ROBOT, ReferenceRobot, SNAPSHOT_BYTES, SONARS, STORE},
     ring::drivers::{Sc18im700, SonarRing, Srf08Config, Srf08Ring},
-    robot::{Board, KeepError, RobotConfig},
+    robot::{Board, RobotConfig, SaveError},
     wire::{QueueFull, ResetCause},
 };
 
@@ -82,9 +82,9 @@ impl Board for Stm32f405<'_> {
         u32::try_from(support::stack_high_water_bytes()).unwrap_or(u32::MAX)
     }
 
-    fn keep(&mut self, snapshot: &[u8]) -> Result<(), KeepError> {
-        let store = self.store.as_mut().ok_or(KeepError::NoStore)?;
-        store.save(snapshot).map_err(|_| KeepError::Failed)
+    fn save(&mut self, snapshot: &[u8]) -> Result<(), SaveError> {
+        let store = self.store.as_mut().ok_or(SaveError::NoStore)?;
+        store.save(snapshot).map_err(|_| SaveError::Failed)
     }
 }
 

@@ -13,6 +13,7 @@ pub use paper::{
 };
 pub use robust::{RobustConfig, RobustFilter};
 
+use crate::VertexId;
 use core::fmt;
 use rand_core::SeedableRng;
 use rand_xoshiro::Xoshiro128PlusPlus;
@@ -29,12 +30,12 @@ pub struct Update {
     /// How many places were observed before this one.
     pub place_index: u32,
     /// The vertex the robot is at (Section III.B).
-    pub vertex: u8,
+    pub vertex: VertexId,
     /// Whether the vertex was added by this observation.
     pub is_new: bool,
     /// The distance of Eq. 2, or of the half of it that is configured, in millimetres; `u16::MAX` when it is infinite.
     pub consistency_mm: u16,
-    /// The three factors of the weight.
+    /// The factors of the weight.
     pub factors: WeightFactors,
     /// By how much the weight leads that of every other prediction, at least, as a logarithm in units of 2⁻¹⁶ nats:
     /// predictions that were never proposed count with a bound on their weight. Negative when a heavier one was not
@@ -48,32 +49,70 @@ impl Update {
     /// What a filter tells that was never started.
     pub(crate) const NONE: Self = Self {
         place_index: 0,
-        vertex: 0,
+        vertex: VertexId::FIRST,
         is_new: false,
         consistency_mm: 0,
-        factors: WeightFactors::ONE,
+        factors: WeightFactors::Robust(RobustFactors::ONE),
         lead_q16: 0,
         distinct: 0,
     };
 }
 
-/// The three factors of a weight (Eq. 6), as logarithms in units of 2⁻¹⁶ nats.
+/// The factors of the weight of a hypothesis, one variant for each filter.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct WeightFactors {
-    /// ln of Eq. 7: how well the observation fits the label its vertex had before.
-    pub ln_label_q16: i32,
-    /// ln of Eq. 8: how consistent the map is with the evidence.
-    pub ln_consistency_q16: i32,
-    /// ln of Eq. 9: what the size of the map costs.
-    pub ln_size_q16: i32,
+pub enum WeightFactors {
+    /// Of a [`RobustFilter`].
+    Robust(RobustFactors),
+    /// Of a [`PaperFilter`].
+    Paper(PaperFactors),
 }
 
 impl WeightFactors {
+    /// The logarithm of the weight, the sum of those of its factors, in units of 2⁻¹⁶ nats; saturates.
+    #[must_use]
+    pub const fn ln_weight_q16(&self) -> i32 {
+        let (ln_size, ln_label, ln_rest) = match self {
+            Self::Robust(factors) => (factors.ln_size_q16, factors.ln_labels_q16, factors.ln_moves_q16),
+            Self::Paper(factors) => (factors.ln_size_q16, factors.ln_label_q16, factors.ln_consistency_q16),
+        };
+        ln_size.saturating_add(ln_label).saturating_add(ln_rest)
+    }
+}
+
+/// The factors of the weight of a hypothesis of the robust filter, as natural logarithms in units of 2⁻¹⁶ nats.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct RobustFactors {
+    /// The evidence of the observed labels, with the means and variances of the vertices integrated out.
+    pub ln_labels_q16: i32,
+    /// The evidence of the moves between vertices and of the hints.
+    pub ln_moves_q16: i32,
+    /// The prior of the numbers of vertices and edges.
+    pub ln_size_q16: i32,
+}
+
+impl RobustFactors {
+    /// No evidence.
+    pub(crate) const ONE: Self = Self { ln_labels_q16: 0, ln_moves_q16: 0, ln_size_q16: 0 };
+}
+
+/// The factors of the weight of a particle of the paper's filter (Eq. 6), as natural logarithms in units of 2⁻¹⁶ nats.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct PaperFactors {
+    /// Eq. 7: how well the observation fits the label that its vertex had before.
+    pub ln_label_q16: i32,
+    /// Eq. 8: how consistent the map is with the history.
+    pub ln_consistency_q16: i32,
+    /// Eq. 9: the penalty for similar vertices.
+    pub ln_size_q16: i32,
+}
+
+impl PaperFactors {
     pub(crate) const ONE: Self = Self { ln_label_q16: 0, ln_consistency_q16: 0, ln_size_q16: 0 };
 
-    /// ln of the weight (Eq. 6), in units of 2⁻¹⁶ nats; saturates.
+    /// The logarithm of the weight (Eq. 6) in units of 2⁻¹⁶ nats; saturates.
+    #[must_use]
     pub const fn ln_weight_q16(&self) -> i32 {
-        self.ln_size_q16.saturating_add(self.ln_label_q16).saturating_add(self.ln_consistency_q16)
+        WeightFactors::Paper(*self).ln_weight_q16()
     }
 }
 
@@ -88,15 +127,15 @@ pub struct WorstNgram {
     /// How many places ago the newest of its labels was observed; 0 for the newest place.
     pub newest_age: u16,
     /// The vertices of the nearest walk, the oldest first, `length` of them.
-    pub vertices: [u8; 7],
+    pub vertices: [VertexId; 7],
 }
 
 impl WorstNgram {
     /// No n-gram.
-    pub const NONE: Self = Self { distance_mm: 0, length: 0, newest_age: 0, vertices: [0; 7] };
+    pub const NONE: Self = Self { distance_mm: 0, length: 0, newest_age: 0, vertices: [VertexId::FIRST; 7] };
 
     /// The vertices of the nearest walk, the oldest first.
-    pub fn walk(&self) -> &[u8] {
+    pub fn walk(&self) -> &[VertexId] {
         self.vertices.get(..usize::from(self.length)).unwrap_or(&self.vertices)
     }
 }

@@ -8,7 +8,7 @@ use proptest::prelude::*;
 use toposlam::{
     FaultCounters, FaultKind,
     ring::drivers::{
-        HcSr04Config, HcSr04Ring, MaxBotixConfig, MaxBotixRing, Microseconds, SonarRing, Srf08Config, Srf08Ring,
+        HcSr04Config, HcSr04Ring, MaxBotixConfig, MaxBotixRing, MicrosecondClock, SonarRing, Srf08Config, Srf08Ring,
     },
     ring::{Echo, RingFrame},
 };
@@ -83,7 +83,7 @@ impl digital::OutputPin for Noise {
     }
 }
 
-impl Microseconds for Noise {
+impl MicrosecondClock for Noise {
     /// Forwards, backwards, or not at all.
     fn now_us(&mut self) -> u32 {
         u32::from_le_bytes(std::array::from_fn(|_| self.byte()))
@@ -129,7 +129,7 @@ proptest! {
             (pin.clone(), pin)
         });
         let mut waited = Waited::default();
-        let config = HcSr04Config { standstill_polls: 100, ..HcSr04Config::DEFAULT };
+        let config = HcSr04Config { stopped_clock_polls: 100, ..HcSr04Config::DEFAULT };
         let mut ring = HcSr04Ring::new(pins, Noise::of(clock), &mut waited, config).unwrap();
         let mut faults = FaultCounters::new();
         assert_sound(ring.read(&mut faults), &faults, 20, 4000);

@@ -8,7 +8,7 @@ use embedded_hal_mock::eh1::{
 };
 use toposlam::{
     FaultCounters,
-    ring::drivers::{FiringPlan, HcSr04Config, HcSr04Ring, Microseconds, SonarError, SonarFault, SonarRing},
+    ring::drivers::{FiringPlan, HcSr04Config, HcSr04Ring, MicrosecondClock, SonarError, SonarFault, SonarRing},
     ring::{Echo, RingFrame},
 };
 use toposlam_sim::chip::{EchoPin, HcSr04Bank, HcSr04Fault, SimulatedTime, TriggerPin};
@@ -133,7 +133,7 @@ fn a_clone_that_gives_up_late_is_silence_in_every_frame() {
 #[test]
 fn when_the_clock_stands_still_the_ring_says_so_in_bounded_time() {
     let mut time = SimulatedTime::new(0, 0);
-    let (mut ring, _bank) = ring(HcSr04Config { standstill_polls: 500, ..HcSr04Config::DEFAULT }, &time);
+    let (mut ring, _bank) = ring(HcSr04Config { stopped_clock_polls: 500, ..HcSr04Config::DEFAULT }, &time);
     let mut faults = FaultCounters::new();
     let frame = ring.read(&mut faults);
     assert_eq!(frame, RingFrame { echoes: [Echo::Dead; 16] });
@@ -145,7 +145,7 @@ fn when_the_clock_stands_still_the_ring_says_so_in_bounded_time() {
 /// A clock that tells what it was told to tell.
 struct Recited(VecDeque<u32>);
 
-impl Microseconds for Recited {
+impl MicrosecondClock for Recited {
     fn now_us(&mut self) -> u32 {
         self.0.pop_front().expect("the driver looks at the clock as often as was written down")
     }

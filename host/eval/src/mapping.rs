@@ -82,7 +82,7 @@ impl<const SONARS: usize> Stages<SONARS> for Paper<SONARS> {
         let Self(mapper, ancestry) = self;
         let observed = mapper.observe(frame, turn)?;
         let particles = mapper.filter().particles().iter();
-        ancestry.advance(particles.map(|particle| (particle.parent.into(), particle.place.into())));
+        ancestry.advance(particles.map(|particle| (particle.parent.into(), particle.at.into())));
         Some(observed)
     }
 
@@ -141,7 +141,7 @@ impl<const SONARS: usize> Mapping<SONARS> {
     pub fn observe(&mut self, frame: &RingFrame<SONARS>, turn: Option<Turn>) -> Option<Step> {
         let (place, update) = self.stages.observe(frame, turn)?;
         let map = self.map();
-        let step = Step { place, update, vertices: map.vertices(), edges: map.edges().count() };
+        let step = Step { place, update, vertices: map.vertices().len() as u8, edges: map.edges().count() };
         self.steps.push(step);
         Some(step)
     }
@@ -184,7 +184,7 @@ pub fn score_path<const V: usize>(
     nodes: &[Option<usize>],
 ) -> MapScore {
     let edges = map.edges().map(|(a, b)| (usize::from(a), usize::from(b)));
-    let map = Graph::from_edges(map.vertices().into(), edges);
+    let map = Graph::from_edges(map.vertices().len(), edges);
     let mut visited: Vec<usize> = nodes.iter().copied().flatten().collect();
     visited.sort_unstable();
     visited.dedup();

@@ -18,8 +18,8 @@
 //! ```
 
 use petgraph::graph::UnGraph;
-use toposlam::Map;
-use toposlam::wire::{Picture, crc32};
+use toposlam::wire::{MapReplica, crc32};
+use toposlam::{Map, VertexId};
 
 /// The vertices of a map and the edges between them.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Hash)]
@@ -80,22 +80,23 @@ impl TopologicalMap {
 }
 
 /// The map as heard so far.
-impl<const V: usize> From<&Picture<V>> for TopologicalMap {
-    fn from(picture: &Picture<V>) -> Self {
+impl<const V: usize> From<&MapReplica<V>> for TopologicalMap {
+    fn from(replica: &MapReplica<V>) -> Self {
         let label = |vertex| {
-            picture.row(vertex).map_or(Vertex::default(), |row| Vertex { radius_mm: row.radius_mm, visits: row.visits })
+            replica.row(vertex).map_or(Vertex::default(), |row| Vertex { radius_mm: row.radius_mm, visits: row.visits })
         };
-        Self { vertices: (0..picture.vertices()).map(label).collect(), edges: picture.edges().collect() }
+        Self { vertices: (0..replica.vertices()).map(label).collect(), edges: replica.edges().collect() }
     }
 }
 
 impl<const V: usize> From<&Map<V>> for TopologicalMap {
     fn from(map: &Map<V>) -> Self {
-        let label = |(vertex, label): (u8, &toposlam::Fingerprint)| Vertex {
+        let label = |(vertex, label): (VertexId, &toposlam::Fingerprint)| Vertex {
             radius_mm: label.radius_mm(),
             visits: map.visits(vertex),
         };
-        Self { vertices: (0..).zip(map.labels()).map(label).collect(), edges: map.edges().collect() }
+        let edges = map.edges().map(|(a, b)| (a.into(), b.into()));
+        Self { vertices: map.vertices().zip(map.labels()).map(label).collect(), edges: edges.collect() }
     }
 }
 
@@ -106,11 +107,10 @@ mod tests {
     #[test]
     fn the_digest_is_the_one_that_a_robot_has_of_the_same_map() {
         let mut map: Map<8> = Map::new();
-        for radius_mm in [1200, 400, 700] {
-            map.add_vertex(toposlam::Fingerprint::from_radius_mm(radius_mm).unwrap()).unwrap();
-        }
-        map.add_edge(0, 2);
-        map.add_edge(1, 1);
+        let radius = |radius_mm| toposlam::Fingerprint::from_radius_mm(radius_mm).unwrap();
+        let [a, b, c] = [1200, 400, 700].map(|radius_mm| map.add_vertex(radius(radius_mm)).unwrap());
+        map.add_edge(a, c);
+        map.add_edge(b, b);
         assert_eq!(TopologicalMap::from(&map).digest(), toposlam::wire::map_digest(&map));
         assert_eq!(TopologicalMap::default().digest(), toposlam::wire::map_digest(&Map::<8>::new()));
     }
@@ -118,9 +118,9 @@ mod tests {
     #[test]
     fn a_map_of_which_little_was_heard_has_the_vertices_of_its_edges() {
         use toposlam::wire::{Arrival, Header, Message};
-        let mut picture = Picture::<64>::new();
-        picture.apply(Header { sequence: 0, arrival: Arrival::First }, &Message::Edge { a: 1, b: 3, present: true });
-        let topology = TopologicalMap::from(&picture);
+        let mut replica = MapReplica::<64>::new();
+        replica.apply(Header { sequence: 0, arrival: Arrival::First }, &Message::Edge { a: 1, b: 3, present: true });
+        let topology = TopologicalMap::from(&replica);
         assert_eq!((topology.vertices.len(), &topology.edges[..]), (4, &[(1, 3)][..]));
         assert_eq!(topology.neighbours(), [vec![], vec![3], vec![], vec![1]]);
         assert_eq!(topology.to_petgraph().edge_count(), 1);

@@ -11,16 +11,16 @@ use core::{
 use static_cell::ConstStaticCell;
 use toposlam::{
     Config, ConfigError, Consistency, Direction, FaultCounters, FaultKind, Fingerprint, FingerprintError, History, Map,
-    MapperError, Ngram, NgramError, NgramLength, NgramTable, NgramsFull, Observation, PaperFilter, Prior, RobustConfig,
-    RobustFilter, Turn, VerticesFull,
+    MapperError, Ngram, NgramError, NgramLength, NgramTable, NgramsFull, Observation, PaperFilter, PerVertex, Prior,
+    RobustConfig, RobustFilter, Turn, VertexId, VertexSet, VerticesFull,
     persist::Persist,
     persist::snapshot::{FILTER_SECTION, Resume, Snapshot, SnapshotError, SnapshotPolicy, Writer},
     place::{PlaceConfig, PlaceConfigError, PlaceDetector},
     reference,
     ring::{Echo, RingFrame, RingGeometry},
     wire::{
-        Decoder, EncodeError, Encoder, Hello, HelloError, Inbox, JourneyState, MAX_FRAME_BYTES, Message, Outcome,
-        Payload, Picture, Progress, QueueFull, Refusal, Reply, Reporter, Request, ResetCause, Setting, Settings,
+        Decoder, EncodeError, Encoder, GoalState, Hello, HelloError, Inbox, MAX_FRAME_BYTES, MapReplica, Message,
+        Outcome, Payload, Progress, QueueFull, Refusal, Reply, Reporter, Request, ResetCause, Setting, Settings,
         Staging, Version, crc32, map_digest,
     },
 };
@@ -136,6 +136,10 @@ fn table(length: NgramLength, ngram: Ngram) {
     table.clear();
 }
 
+fn any_vertex() -> VertexId {
+    VertexId::new(black_box(1)).unwrap_or(VertexId::FIRST)
+}
+
 pub(crate) fn map_and_history() {
     static MAP: ConstStaticCell<Map<VERTICES>> = ConstStaticCell::new(Map::new());
     let Some(map) = MAP.try_take() else { return };
@@ -144,9 +148,22 @@ pub(crate) fn map_and_history() {
             show::<VerticesFull>(error);
         }
     }
-    map.observe(black_box(1), any_fingerprint());
-    map.add_edge(black_box(1), black_box(2));
-    black_box((map.vertices(), map.label(black_box(1)), map.visits(black_box(1)), map.neighbours(black_box(1))));
+    map.observe(any_vertex(), any_fingerprint());
+    map.add_edge(any_vertex(), any_vertex());
+    black_box((map.vertices().len(), map.contains(any_vertex()), map.label(any_vertex()), map.visits(any_vertex())));
+    let mut set = map.neighbours(any_vertex());
+    set.insert(any_vertex());
+    set.remove(any_vertex());
+    black_box((set.contains(any_vertex()), set.len(), set.is_empty(), set.bits(), set.pop_first()));
+    black_box(
+        set | VertexSet::from(any_vertex()) & VertexSet::first(black_box(3)) - VertexSet::from_bits(black_box(7)),
+    );
+    for vertex in set.iter() {
+        black_box(vertex);
+    }
+    let mut per_vertex = PerVertex::<u32, 10>::filled(0);
+    per_vertex[any_vertex()] = black_box(1);
+    black_box((per_vertex[any_vertex()], per_vertex.get(any_vertex())));
     black_box(map.labels());
     for edge in map.edges() {
         black_box(edge);
@@ -211,13 +228,13 @@ fn robust<const N: usize, const V: usize, const HISTORY: usize>(filter: &mut Rob
         filter.set_localise_only(black_box(true));
         filter.polish();
         black_box(filter.refresh());
-        black_box(filter.assume_path(black_box(&[0, 1, 0])));
+        black_box(filter.assume_path(&[any_vertex(); 3]));
     }
     let map = *filter.map();
     let restarted = filter.start_with_map(RobustConfig::default().opaque(), black_box(1), black_box(&map));
     let _ = black_box((restarted, filter.evidence(), filter.noise_mm()));
-    black_box((filter.map(), filter.observed(), filter.faults(), filter.renamed(black_box(3)), filter.worst()));
-    black_box((filter.place_probability_q16(black_box(3)), filter.map_probability_q16()));
+    black_box((filter.map(), filter.observed(), filter.faults(), filter.renamed(any_vertex()), filter.worst()));
+    black_box((filter.place_probability_q16(any_vertex()), filter.map_probability_q16()));
     for vertex in filter.path() {
         black_box(vertex);
     }
@@ -318,7 +335,7 @@ fn snapshot(mapper: &mut reference::RobotMapper) {
 pub(crate) fn wire() {
     static BYTES: ConstStaticCell<[u8; MAX_FRAME_BYTES]> = ConstStaticCell::new([0; MAX_FRAME_BYTES]);
     static DECODER: ConstStaticCell<Decoder> = ConstStaticCell::new(Decoder::new());
-    static PICTURE: ConstStaticCell<Picture<64>> = ConstStaticCell::new(Picture::new());
+    static PICTURE: ConstStaticCell<MapReplica<64>> = ConstStaticCell::new(MapReplica::new());
     let (Some(bytes), Some(decoder), Some(picture)) = (BYTES.try_take(), DECODER.try_take(), PICTURE.try_take()) else {
         return;
     };
@@ -347,7 +364,7 @@ pub(crate) fn wire() {
         black_box(edge);
     }
     black_box((picture.hello(), picture.location(), picture.evidence(), picture.health()));
-    black_box((picture.belief(), picture.worst(), picture.journey()));
+    black_box((picture.belief(), picture.worst(), picture.goal_status()));
     black_box((picture.neighbours(black_box(3)), picture.fault(FaultKind::BusError.opaque())));
     if let Some(Err(error)) = picture.hello().map(|hello: Hello| hello.check()) {
         show::<HelloError>(error);
@@ -407,5 +424,5 @@ pub(crate) fn commands() {
     };
     black_box(settings.with(Setting::Hypotheses(7).opaque(), black_box(10), black_box(16)).is_ok());
     show(ResetCause::from(black_box(3)));
-    show(JourneyState::from(black_box(3)));
+    show(GoalState::from(black_box(3)));
 }

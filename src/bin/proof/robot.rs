@@ -5,15 +5,15 @@ use core::hint::black_box;
 
 use embedded_hal::{digital, pwm};
 use static_cell::ConstStaticCell;
-use toposlam::FaultCounters;
 use toposlam::drive::{
     DifferentialDrive, Drive, DriveConfig, DriveConfigError, Goal, MotorError, VelocityCommand, WheelSpeeds,
     WheelsConfig, WheelsConfigError,
 };
 use toposlam::persist::snapshot::{Resume, SnapshotError};
 use toposlam::reference::{self, HISTORY, ReferenceRobot, SNAPSHOT_BYTES, VERTICES};
-use toposlam::robot::{Board, KeepError, RobotError};
+use toposlam::robot::{Board, RobotError, SaveError};
 use toposlam::wire::QueueFull;
+use toposlam::{FaultCounters, VertexId};
 
 use super::{Opaque, any_frame, show};
 
@@ -46,7 +46,7 @@ impl Board for Any {
         black_box(0)
     }
 
-    fn keep(&mut self, snapshot: &[u8]) -> Result<(), KeepError> {
+    fn save(&mut self, snapshot: &[u8]) -> Result<(), SaveError> {
         black_box(snapshot);
         black_box(Ok(()))
     }
@@ -102,7 +102,7 @@ pub(crate) fn drive() {
     if let Err(error) = drive.start(DriveConfig::DEFAULT.opaque(), black_box(1)).and(drive.set_speed(black_box(3))) {
         show::<DriveConfigError>(error);
     }
-    drive.set_goal(Goal::Vertex(3).opaque());
+    drive.set_goal(Goal::Vertex(VertexId::FIRST).opaque());
     drive.kidnapped();
     black_box((drive.turn(), drive.goal(), drive.goal_status(), drive.state(), drive.holds_place(), drive.faults()));
 }
@@ -121,6 +121,6 @@ pub(crate) fn robot() {
     if let Err(error) = robot.restore(black_box(&[1, 2, 3]), resume) {
         show::<SnapshotError>(error);
     }
-    show(KeepError::NoStore.opaque());
+    show(SaveError::NoStore.opaque());
     black_box((robot.mapper(), robot.drive(), robot.faults(&FaultCounters::new())));
 }

@@ -14,7 +14,7 @@ use toposlam::{
     ring::RingFrame,
     ring::drivers::{
         AddressError, BridgeError, FiringPlan, HcSr04Config, HcSr04ConfigError, HcSr04Ring, MaxBotixConfig,
-        MaxBotixConfigError, MaxBotixRing, Microseconds, Sc18im700, SonarError, SonarRing, Srf08Config,
+        MaxBotixConfigError, MaxBotixRing, MicrosecondClock, Sc18im700, SonarError, SonarRing, Srf08Config,
         Srf08ConfigError, Srf08Ring, change_maxbotix_address, change_srf08_address,
     },
 };
@@ -97,7 +97,7 @@ impl digital::OutputPin for AnyPin {
 
 struct AnyClock;
 
-impl Microseconds for AnyClock {
+impl MicrosecondClock for AnyClock {
     fn now_us(&mut self) -> u32 {
         black_box(5)
     }

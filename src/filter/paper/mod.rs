@@ -18,7 +18,7 @@ pub use ngram::{Ngram, NgramError, NgramLength, NgramTable, NgramsFull};
 pub use particle::Particle;
 pub use prior::Prior;
 
-use super::{ConfigError, Update, draws};
+use super::{ConfigError, Update, WeightFactors, draws};
 use crate::{FaultCounters, FaultKind, Fingerprint, Map};
 use particles::{Particles, Step};
 use rand_core::Rng;
@@ -39,7 +39,7 @@ use rand_core::Rng;
 ///     filter.observe(Fingerprint::from_radius_mm(radius_mm)?);
 /// }
 /// let best = filter.best();
-/// assert_eq!((best.map.vertices(), best.place), (2, 0));
+/// assert_eq!((best.map.vertices().len(), best.at.index()), (2, 0));
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 #[derive(Clone, Debug)]
@@ -162,10 +162,10 @@ impl<const N: usize, const V: usize, const WORDS: usize> PaperFilter<N, V, WORDS
         let best = self.best();
         let update = Update {
             place_index: self.observed,
-            vertex: best.place,
-            is_new: best.map.visits(best.place) == 1,
+            vertex: best.at,
+            is_new: best.map.visits(best.at) == 1,
             consistency_mm: best.consistency_mm,
-            factors: best.factors,
+            factors: WeightFactors::Paper(best.factors),
             lead_q16: step.lead_q16,
             distinct: self.particles.distinct(),
         };

@@ -1,7 +1,7 @@
-//! Gives a sensor another address: sensors leave their factory with the same one, and a ring needs them apart.
+//! Changes the I2C address of a sensor: new sensors all have the same one.
 //!
-//! Sources: the data sheets named in the modules of the drivers. Both kinds keep an address when they lose power. **Only
-//! one sensor that listens to `from` may be on the bus**; the SRF08's data sheet wants it to be the only sensor at all.
+//! Sources: the data sheets named in the files of the drivers. A sensor stores its address in non-volatile memory. **At most
+//! one sensor with the address `from` may be on the bus**; the SRF08's data sheet requires it to be the only sensor.
 
 use core::fmt;
 
@@ -12,19 +12,19 @@ use embedded_hal::{
 
 use super::{maxbotix, srf08};
 
-/// A sensor may be busy storing its address; it is asked so often, with a pause in between.
+/// While a sensor stores its address it does not answer: it is polled this many times.
 const ATTEMPTS: u8 = 20;
 const PAUSE_MS: u32 = 10;
-/// The revision of a ranger, or two bytes of range: who answers, exists.
+/// Any register serves as a probe.
 const PROBE_BYTES: usize = 2;
 
-/// Gives an SRF08 or SRF10 another 7-bit address, 0x70 to 0x7F.
+/// Changes the 7-bit address of an SRF08 or SRF10 to one from 0x70 to 0x7F.
 ///
-/// Asks whether the new address is free, writes 0xA0, 0xAA, 0xA5 and twice the new address to register 0 in four messages,
-/// and asks the sensor at its new address, for at most 200 ms of waiting.
+/// Checks that no device answers at the new address, writes 0xA0, 0xAA, 0xA5 and the new 8-bit address to register 0 in four
+/// messages, and polls the new address for at most 200 ms.
 ///
 /// # Errors
-/// [`AddressError`] says what failed; after [`Taken`](AddressError::Taken) and before, nothing was changed.
+/// [`AddressError`] with the reason. With `From`, `To` and `Taken` nothing was changed.
 pub fn change_srf08_address<BUS: I2c>(
     bus: &mut BUS,
     delay: &mut impl DelayNs,
@@ -36,13 +36,13 @@ pub fn change_srf08_address<BUS: I2c>(
     change(bus, delay, (from, to), |address| srf08::ADDRESSES.contains(&address), &messages)
 }
 
-/// Gives a MaxBotix I2CXL-MaxSonar another 7-bit address, 0x08 to 0x7F without 0x28, 0x52 and 0x55, which it refuses.
+/// Changes the 7-bit address of a MaxBotix I2CXL-MaxSonar to one from 0x08 to 0x7F, except 0x28, 0x52 and 0x55.
 ///
-/// Asks whether the new address is free, writes 170, 165 and twice the new address in one message, and asks the sensor at
-/// its new address, for at most 200 ms of waiting.
+/// Checks that no device answers at the new address, writes 170, 165 and the new 8-bit address in one message, and polls the
+/// new address for at most 200 ms.
 ///
 /// # Errors
-/// [`AddressError`] says what failed; after [`Taken`](AddressError::Taken) and before, nothing was changed.
+/// [`AddressError`] with the reason. With `From`, `To` and `Taken` nothing was changed.
 pub fn change_maxbotix_address<BUS: I2c>(
     bus: &mut BUS,
     delay: &mut impl DelayNs,
@@ -92,33 +92,33 @@ fn answers<BUS: I2c>(bus: &mut BUS, address: u8) -> Result<bool, AddressError> {
     }
 }
 
-/// Why a sensor did not get another address.
+/// Why the address of a sensor was not changed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum AddressError {
-    /// `from`: not a 7-bit address that the sensor can have.
+    /// `from` is not a 7-bit address of this kind of sensor.
     From,
-    /// `to`: not a 7-bit address that the sensor can have.
+    /// `to` is not a 7-bit address of this kind of sensor.
     To,
-    /// A device answers at the new address already.
+    /// A device already answers at the new address.
     Taken,
-    /// No sensor acknowledged the present address, or not the whole sequence.
+    /// No sensor acknowledged the sequence at the present address.
     Silent,
     /// The bus failed.
     Bus,
-    /// The sequence was sent, and nothing answers at the new address.
+    /// The sequence was acknowledged, but no device answers at the new address.
     Unchanged,
 }
 
 impl fmt::Display for AddressError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(match self {
-            Self::From => "from: not an address that the sensor can have",
-            Self::To => "to: not an address that the sensor can have",
-            Self::Taken => "a device answers at the new address already",
+            Self::From => "from is not an address of this sensor",
+            Self::To => "to is not an address of this sensor",
+            Self::Taken => "a device already answers at the new address",
             Self::Silent => "no sensor acknowledged the present address",
             Self::Bus => "bus error",
-            Self::Unchanged => "nothing answers at the new address afterwards",
+            Self::Unchanged => "no device answers at the new address afterwards",
         })
     }
 }

@@ -1,9 +1,9 @@
-//! A ring of HC-SR04 rangers: a trigger line and an echo line each, timed with a clock of microseconds.
+//! HC-SR04 ultrasonic rangers: a trigger line and an echo line for each, timed with a microsecond clock.
 //!
-//! Source: *HC-SR04 user's manual*. A pulse of 10 µs or more on the trigger line starts a ranging; soon after, the echo line
-//! rises, and it falls when the echo is heard: the pulse is the time of flight, there and back. Without an echo it falls
-//! after about 38 ms; some clones take longer, and some hold the line for ever. 60 ms from one ranging to the next let the
-//! sound die away.
+//! Source: *HC-SR04 user's manual*. A pulse of at least 10 µs on the trigger line starts a measurement. The echo line rises
+//! soon after, and falls when the echo arrives: the width of the pulse is the time of flight of the round trip. Without an
+//! echo it falls after about 38 ms; some clones take longer, and some hold the line high permanently. Two measurements are
+//! at least 60 ms apart, so that the sound decays.
 
 use core::fmt;
 
@@ -14,7 +14,7 @@ use embedded_hal::{
 
 use super::{
     FiringPlan, Reading, SonarError, SonarFault, SonarRing,
-    round::Round,
+    reading::Readings,
     sound::{is_speed_of_sound, range_mm},
 };
 use crate::{
@@ -22,46 +22,47 @@ use crate::{
     ring::{Echo, RingFrame},
 };
 
-/// A clock that counts microseconds and starts again at 0 after `u32::MAX`, such as a free-running timer.
-pub trait Microseconds {
-    /// The time. It need not change between two calls, but it must go on; a step of 6 µs is 1 mm of range.
+/// A clock that counts microseconds and wraps after `u32::MAX`, such as a free-running timer.
+pub trait MicrosecondClock {
+    /// Returns the time. A resolution of 6 µs is one of 1 mm of range.
     fn now_us(&mut self) -> u32;
 }
 
-/// How a ring of HC-SR04 is read.
+/// Firing plan, times and range limits of a ring of HC-SR04.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct HcSr04Config<const SONARS: usize> {
-    /// Which sensors fire together. Default: four groups, so that those that fire together are 90° apart.
+    /// Which sensors fire together. Default: four groups, so that in a ring of 16 those that fire together are 90° apart.
     pub plan: FiringPlan<SONARS>,
-    /// Length of the trigger pulse in microseconds, at least 10. Default 12.
+    /// Width of the trigger pulse, in microseconds, at least 10. Default 12.
     pub trigger_us: u8,
-    /// How long the echo line may take to rise, in microseconds, at least 1. Default 5000; from 0.4 to 2.3 ms were seen.
+    /// Timeout for the rise of the echo line, in microseconds, at least 1. Default 5000; reported delays are 0.4 to 2.3 ms.
     pub rise_timeout_us: u16,
-    /// How long to wait for the echo line to fall, in microseconds, at least as long as an echo from `max_range_mm` takes.
-    /// Default 40,000. A line that is high for longer counts as silence, not as a fault: nothing was heard.
+    /// Timeout for the fall of the echo line, in microseconds, at least the time of flight for `max_range_mm`. Default
+    /// 40,000. A longer pulse is silence, not a fault.
     pub echo_timeout_us: u16,
-    /// From the start of one group to that of the next, in milliseconds, also between frames. Default 60.
+    /// Minimum time from the start of one group to the start of the next, in milliseconds, also between frames. Default 60.
     pub cycle_ms: u8,
-    /// How often the clock may be read without going on before it counts as standing still, at least 1. Default 10,000.
-    pub standstill_polls: u16,
-    /// Speed of sound in metres per second, 300 to 400. Default 343, dry air of 20 °C.
+    /// Number of consecutive reads of the clock without an advance after which it counts as stopped, at least 1. Default
+    /// 10,000.
+    pub stopped_clock_polls: u16,
+    /// Speed of sound in metres per second, 300 to 400. Default 343: dry air at 20 °C.
     pub speed_of_sound_m_per_s: u16,
-    /// The shortest range to believe, in millimetres. Default 20, from the data sheet. What is shorter is a fault.
+    /// Minimum valid range, in millimetres. Default 20, from the data sheet. A shorter one is a fault.
     pub min_range_mm: u16,
-    /// The longest range to believe, in millimetres. Default 4000, from the data sheet. What is longer is silence, for the
-    /// pulse of a sensor that hears nothing is as long as it likes.
+    /// Maximum valid range, in millimetres. Default 4000, from the data sheet. A longer one is silence, because the width of
+    /// the pulse without an echo differs between clones.
     pub max_range_mm: u16,
 }
 
 impl<const SONARS: usize> HcSr04Config<SONARS> {
-    /// The data sheet's values, four firing groups.
+    /// The values of the data sheet, four firing groups.
     pub const DEFAULT: Self = Self {
         plan: FiringPlan::interleaved(4),
         trigger_us: 12,
         rise_timeout_us: 5000,
         echo_timeout_us: 40_000,
         cycle_ms: 60,
-        standstill_polls: 10_000,
+        stopped_clock_polls: 10_000,
         speed_of_sound_m_per_s: 343,
         min_range_mm: 20,
         max_range_mm: 4000,
@@ -71,8 +72,8 @@ impl<const SONARS: usize> HcSr04Config<SONARS> {
         if self.trigger_us < 10 {
             return Err(HcSr04ConfigError::Trigger);
         }
-        if self.standstill_polls == 0 {
-            return Err(HcSr04ConfigError::StandstillPolls);
+        if self.stopped_clock_polls == 0 {
+            return Err(HcSr04ConfigError::StoppedClockPolls);
         }
         if !is_speed_of_sound(self.speed_of_sound_m_per_s) {
             return Err(HcSr04ConfigError::SpeedOfSound);
@@ -87,7 +88,7 @@ impl<const SONARS: usize> HcSr04Config<SONARS> {
         Ok(())
     }
 
-    /// What the length of a pulse means.
+    /// Converts the width of a pulse to an echo.
     fn echo(&self, pulse_us: u32) -> Result<Echo, SonarFault> {
         match u16::try_from(range_mm(pulse_us, self.speed_of_sound_m_per_s)) {
             Ok(range_mm) if range_mm < self.min_range_mm => Err(SonarFault::OutOfRange),
@@ -96,19 +97,19 @@ impl<const SONARS: usize> HcSr04Config<SONARS> {
         }
     }
 
-    /// What the echo line says so many microseconds after the trigger. `rise_us` remembers when it rose.
-    fn look(&self, echo: &mut impl InputPin, rise_us: &mut Option<u32>, elapsed_us: u32) -> Reading {
+    /// The reading of a sensor `elapsed_us` after the trigger. `rise_us` stores when the echo line rose.
+    fn reading(&self, echo: &mut impl InputPin, rise_us: &mut Option<u32>, elapsed_us: u32) -> Reading {
         let since_rise_us = rise_us.map(|rise_us| elapsed_us.saturating_sub(rise_us));
-        Reading::Settled(match (echo.is_high(), since_rise_us) {
+        Reading::Done(match (echo.is_high(), since_rise_us) {
             (Err(_), _) => Err(SonarFault::Bus),
             (Ok(false), Some(pulse_us)) => self.echo(pulse_us),
             (Ok(true), Some(pulse_us)) if pulse_us > self.echo_timeout_us.into() => Ok(Echo::Silence),
             (Ok(false), None) if elapsed_us > self.rise_timeout_us.into() => Err(SonarFault::Silent),
             (Ok(true), None) => {
                 *rise_us = Some(elapsed_us);
-                return Reading::Ranging;
+                return Reading::Pending;
             }
-            _ => return Reading::Ranging,
+            _ => return Reading::Pending,
         })
     }
 }
@@ -127,8 +128,8 @@ pub enum HcSr04ConfigError {
     Trigger,
     /// `rise_timeout_us` is 0, or `echo_timeout_us` is shorter than an echo from `max_range_mm`.
     Timeout,
-    /// `standstill_polls`: 0.
-    StandstillPolls,
+    /// `stopped_clock_polls`: 0.
+    StoppedClockPolls,
     /// `speed_of_sound_m_per_s`: outside 300 to 400.
     SpeedOfSound,
     /// `min_range_mm` is above `max_range_mm`.
@@ -140,7 +141,7 @@ impl fmt::Display for HcSr04ConfigError {
         f.write_str(match self {
             Self::Trigger => "trigger_us: must be 10 or more",
             Self::Timeout => "rise_timeout_us: must not be 0; echo_timeout_us: must leave time for max_range_mm",
-            Self::StandstillPolls => "standstill_polls: must not be 0",
+            Self::StoppedClockPolls => "stopped_clock_polls: must not be 0",
             Self::SpeedOfSound => "speed_of_sound_m_per_s: must be from 300 to 400",
             Self::Range => "min_range_mm: must not be above max_range_mm",
         })
@@ -149,38 +150,37 @@ impl fmt::Display for HcSr04ConfigError {
 
 impl core::error::Error for HcSr04ConfigError {}
 
-/// A ring of `SONARS` HC-SR04 on pins of their own. The sensors of a group may share a trigger line; each then has a handle
-/// to the same pin.
+/// A ring of `SONARS` HC-SR04. The sensors of a group may share a trigger line; each then has a handle to the same pin.
 ///
-/// The sensors of a group are triggered together and timed side by side in one loop, so a frame takes `cycle_ms` for each
-/// firing group, whatever the sensors do. A range is as exact as a turn of that loop is short: a look at the clock and at
-/// each echo line of the group that is still awaited; 6 µs are 1 mm. An interrupt in between lengthens a turn.
+/// The sensors of a group are triggered together and timed in one polling loop, so a frame takes `cycle_ms` for each firing
+/// group. The resolution of a range is the duration of one iteration of that loop, which reads the clock and each pending
+/// echo line of the group: 6 µs are 1 mm. An interrupt lengthens an iteration.
 ///
-/// Nothing is waited for without a bound: each line has its time-outs, and a clock that stands still is noticed.
+/// Every wait is bounded: each line has a timeout, and a stopped clock is detected.
 ///
 /// - A line that does not rise is [`SonarFault::Silent`].
-/// - A line that is high already before the trigger is [`SonarFault::Stuck`], and that sensor is not triggered; a clone that
-///   hangs is silence once and stuck from then on, until its power is cut.
-/// - A pin that cannot be read or set is [`SonarFault::Bus`].
+/// - A line that is high before the trigger is [`SonarFault::Stuck`], and that sensor is not triggered. A clone that holds its
+///   line high is silence in the first frame and stuck in the following ones, until its supply is switched off.
+/// - A pin that returns an error is [`SonarFault::Bus`].
 #[derive(Debug)]
 pub struct HcSr04Ring<TRIGGER, ECHO, CLOCK, DELAY, const SONARS: usize> {
     pins: [(TRIGGER, ECHO); SONARS],
     clock: CLOCK,
     delay: DELAY,
     config: HcSr04Config<SONARS>,
-    /// When the latest group was triggered.
+    /// Time of the newest trigger.
     fired_us: Option<u32>,
     last_error: Option<SonarError>,
 }
 
-impl<TRIGGER: OutputPin, ECHO: InputPin, CLOCK: Microseconds, DELAY: DelayNs, const SONARS: usize>
+impl<TRIGGER: OutputPin, ECHO: InputPin, CLOCK: MicrosecondClock, DELAY: DelayNs, const SONARS: usize>
     HcSr04Ring<TRIGGER, ECHO, CLOCK, DELAY, SONARS>
 {
-    /// A ring on its pins, trigger and echo of each sensor; the trigger lines are to be low. No pin is touched before the
-    /// first frame.
+    /// Creates a ring on the trigger and the echo pin of each sensor. The trigger lines must be low. Touches no pin before
+    /// the first frame.
     ///
     /// # Errors
-    /// Names the field of the configuration that cannot be.
+    /// The first setting that is out of its range.
     pub fn new(
         pins: [(TRIGGER, ECHO); SONARS],
         clock: CLOCK,
@@ -191,13 +191,13 @@ impl<TRIGGER: OutputPin, ECHO: InputPin, CLOCK: Microseconds, DELAY: DelayNs, co
         Ok(Self { pins, clock, delay, config, fired_us: None, last_error: None })
     }
 
-    /// Gives the pins, the clock and the delay back.
+    /// Returns the pins, the clock and the delay.
     pub fn release(self) -> ([(TRIGGER, ECHO); SONARS], CLOCK, DELAY) {
         (self.pins, self.clock, self.delay)
     }
 
-    /// Waits until the sound of the group before has died away.
-    fn rest(&mut self) {
+    /// Waits until the cycle of the group before is over.
+    fn wait_for_cycle(&mut self) {
         let Some(fired_us) = self.fired_us else { return };
         let since_us = self.clock.now_us().wrapping_sub(fired_us);
         let rest_us = u32::from(self.config.cycle_ms).saturating_mul(1000).saturating_sub(since_us);
@@ -206,69 +206,69 @@ impl<TRIGGER: OutputPin, ECHO: InputPin, CLOCK: Microseconds, DELAY: DelayNs, co
         }
     }
 
-    /// Triggers the sensors of a group whose lines are at rest; the others are settled.
-    fn fire(&mut self, group: u8, round: &mut Round<SONARS>) {
-        self.for_ranging(group, round, |_, echo| match echo.is_low() {
+    /// Triggers the sensors of a group whose echo line is low; the others are done.
+    fn fire(&mut self, group: u8, readings: &mut Readings<SONARS>) {
+        self.for_pending(group, readings, |_, echo| match echo.is_low() {
             Ok(true) => Ok(()),
             Ok(false) => Err(SonarFault::Stuck),
             Err(_) => Err(SonarFault::Bus),
         });
-        self.for_ranging(group, round, |trigger, _| trigger.set_high().map_err(|_| SonarFault::Bus));
+        self.for_pending(group, readings, |trigger, _| trigger.set_high().map_err(|_| SonarFault::Bus));
         self.delay.delay_us(self.config.trigger_us.into());
-        self.for_ranging(group, round, |trigger, _| trigger.set_low().map_err(|_| SonarFault::Bus));
+        self.for_pending(group, readings, |trigger, _| trigger.set_low().map_err(|_| SonarFault::Bus));
     }
 
-    fn for_ranging(
+    fn for_pending(
         &mut self,
         group: u8,
-        round: &mut Round<SONARS>,
+        readings: &mut Readings<SONARS>,
         mut act: impl FnMut(&mut TRIGGER, &mut ECHO) -> Result<(), SonarFault>,
     ) {
-        for (sensor, reading) in round.ranging(group) {
+        for (sensor, reading) in readings.pending(group) {
             let Some((trigger, echo)) = self.pins.get_mut(sensor) else { continue };
             if let Err(fault) = act(trigger, echo) {
-                *reading = Reading::Settled(Err(fault));
+                *reading = Reading::Done(Err(fault));
             }
         }
     }
 
-    /// Times the pulses of a group until each has ended or its time is up.
-    fn listen(&mut self, group: u8, round: &mut Round<SONARS>) {
+    /// Measures the pulses of a group until each has ended or timed out.
+    fn time_pulses(&mut self, group: u8, readings: &mut Readings<SONARS>) {
         let fired_us = self.clock.now_us();
         self.fired_us = Some(fired_us);
         let mut rises_us = [None; SONARS];
         let mut elapsed_us = 0;
-        let mut standstill = 0;
-        while round.is_ranging(group) {
+        let mut stopped_polls = 0;
+        while readings.is_pending(group) {
             let now_us = self.clock.now_us().wrapping_sub(fired_us);
             if now_us > elapsed_us {
                 elapsed_us = now_us;
-                standstill = 0;
-            } else if standstill < self.config.standstill_polls {
-                standstill += 1;
+                stopped_polls = 0;
+            } else if stopped_polls < self.config.stopped_clock_polls {
+                stopped_polls += 1;
             } else {
-                round.settle(group, Err(SonarFault::Clock));
+                readings.complete(group, Err(SonarFault::Clock));
             }
-            for (sensor, reading) in round.ranging(group) {
+            for (sensor, reading) in readings.pending(group) {
                 if let (Some((_, echo)), Some(rise_us)) = (self.pins.get_mut(sensor), rises_us.get_mut(sensor)) {
-                    *reading = self.config.look(echo, rise_us, elapsed_us);
+                    *reading = self.config.reading(echo, rise_us, elapsed_us);
                 }
             }
         }
     }
 }
 
-impl<TRIGGER: OutputPin, ECHO: InputPin, CLOCK: Microseconds, DELAY: DelayNs, const SONARS: usize> SonarRing<SONARS>
+impl<TRIGGER: OutputPin, ECHO: InputPin, CLOCK: MicrosecondClock, DELAY: DelayNs, const SONARS: usize> SonarRing<SONARS>
     for HcSr04Ring<TRIGGER, ECHO, CLOCK, DELAY, SONARS>
 {
     fn read(&mut self, faults: &mut FaultCounters) -> RingFrame<SONARS> {
-        let mut round = Round::new(&self.config.plan);
+        let mut readings = Readings::new(&self.config.plan);
         for group in self.config.plan.groups() {
-            self.rest();
-            self.fire(group, &mut round);
-            self.listen(group, &mut round);
+            self.wait_for_cycle();
+            self.fire(group, &mut readings);
+            self.time_pulses(group, &mut readings);
         }
-        let (frame, last_error) = round.frame(faults);
+        let (frame, last_error) = readings.into_frame(faults);
         self.last_error = last_error;
         frame
     }
@@ -283,7 +283,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn every_believable_range_survives_the_pulse() {
+    fn every_valid_range_is_exact_in_the_unit_of_the_pulse() {
         let config = HcSr04Config::<1>::DEFAULT;
         for range_mm in config.min_range_mm..=config.max_range_mm {
             let pulse_us = (u32::from(range_mm) * 2000 + 171) / 343;
@@ -292,7 +292,7 @@ mod tests {
     }
 
     #[test]
-    fn a_pulse_too_short_for_the_data_sheet_is_nonsense_and_one_too_long_is_silence() {
+    fn a_pulse_below_the_data_sheet_is_out_of_range_and_one_above_is_silence() {
         let config = HcSr04Config::<1>::DEFAULT;
         for pulse_us in [0, 1, 113] {
             assert_eq!(config.echo(pulse_us), Err(SonarFault::OutOfRange));
@@ -310,7 +310,7 @@ mod tests {
             (HcSr04Config { trigger_us: 9, ..good }, HcSr04ConfigError::Trigger),
             (HcSr04Config { rise_timeout_us: 0, ..good }, HcSr04ConfigError::Timeout),
             (HcSr04Config { echo_timeout_us: 23_000, ..good }, HcSr04ConfigError::Timeout),
-            (HcSr04Config { standstill_polls: 0, ..good }, HcSr04ConfigError::StandstillPolls),
+            (HcSr04Config { stopped_clock_polls: 0, ..good }, HcSr04ConfigError::StoppedClockPolls),
             (HcSr04Config { speed_of_sound_m_per_s: 401, ..good }, HcSr04ConfigError::SpeedOfSound),
             (HcSr04Config { min_range_mm: 4001, ..good }, HcSr04ConfigError::Range),
         ];

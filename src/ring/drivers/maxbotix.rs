@@ -1,8 +1,8 @@
-//! A ring of MaxBotix I2CXL-MaxSonar rangers (MB12x2) on one I2C bus.
+//! MaxBotix I2CXL-MaxSonar ultrasonic rangers (MB12x2) on one I2C bus.
 //!
-//! Source: MaxBotix, *I2CXL-MaxSonar-EZ series data sheet* PD11848. A written 81 starts a ranging; while it lasts the ranger
-//! ignores the bus. About 80 ms later a read gives two bytes, the range in centimetres, high byte first: 20 to 765, where
-//! 765 is what it says when nothing is in range. 100 ms from one ranging to the next let the sound die away.
+//! Source: MaxBotix, *I2CXL-MaxSonar-EZ series data sheet* PD11848. Writing 81 starts a measurement, during which the ranger
+//! does not acknowledge its address. About 80 ms later a read returns two bytes, the range in centimetres, high byte first:
+//! 20 to 765, where 765 means no echo. Two measurements are at least 100 ms apart, so that the sound decays.
 
 use core::fmt;
 
@@ -11,33 +11,33 @@ use embedded_hal::i2c::I2c;
 use super::{FiringPlan, I2cRanger, I2cRing, RangingTiming, Reading, SonarFault, i2c_ring::addresses_fit};
 use crate::ring::Echo;
 
-const TAKE_A_RANGE: u8 = 81;
-const NEAREST_CM: u16 = 20;
-const NOTHING_HEARD_CM: u16 = 765;
+const START_MEASUREMENT: u8 = 81;
+const MIN_RANGE_CM: u16 = 20;
+const NO_ECHO_CM: u16 = 765;
 const POLL_INTERVAL_US: u32 = 2000;
 
-/// The data sheet takes all but four 8-bit addresses (0, 80, 164 and 170); those below 0x08 belong to the bus itself.
+/// All 7-bit addresses that I2C does not reserve, except those of the 8-bit addresses 80, 164 and 170 (data sheet).
 pub(super) const fn is_address(address: u8) -> bool {
     matches!(address, 0x08..=0x7F) && !matches!(address << 1, 80 | 164 | 170)
 }
 
-/// How a ring of I2CXL-MaxSonar is wired and read.
+/// Addresses, firing plan and times of a ring of I2CXL-MaxSonar.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct MaxBotixConfig<const SONARS: usize> {
-    /// The 7-bit address of sensor 0; sensor *i* is at this plus *i*. All of them from 0x08 to 0x7F and none of 0x28, 0x52
-    /// and 0x55, which the sensor refuses. Default 0x70, so at most 16 sensors.
+    /// 7-bit address of sensor 0; sensor *i* has this address plus *i*. All addresses must be from 0x08 to 0x7F, except 0x28,
+    /// 0x52 and 0x55. Default 0x70, for at most 16 sensors.
     pub first_address: u8,
-    /// Which sensors fire together. Default: two groups, even and odd.
+    /// Which sensors fire together. Default: two groups, even and odd indices.
     pub plan: FiringPlan<SONARS>,
-    /// From the start of a ranging to the first question, in milliseconds, at least 1. Default 80.
+    /// Time from the start of a measurement to the first poll, in milliseconds, at least 1. Default 80.
     pub ranging_ms: u8,
-    /// From the start of a group to that of the next, in milliseconds, `ranging_ms` at least. Default 100. Until then a
-    /// sensor that has not answered is asked again, every 2 ms.
+    /// Time from the start of a group to the start of the next, in milliseconds, at least `ranging_ms`. Default 100. Until
+    /// then a pending sensor is polled every 2 ms.
     pub cycle_ms: u8,
 }
 
 impl<const SONARS: usize> MaxBotixConfig<SONARS> {
-    /// The data sheet's values, two firing groups.
+    /// The values of the data sheet, two firing groups.
     pub const DEFAULT: Self =
         Self { first_address: 0x70, plan: FiringPlan::interleaved(2), ranging_ms: 80, cycle_ms: 100 };
 }
@@ -48,11 +48,11 @@ impl<const SONARS: usize> Default for MaxBotixConfig<SONARS> {
     }
 }
 
-/// What the centimetres of a reply mean.
+/// Converts a reply to an echo.
 fn echo(range_cm: u16) -> Result<Echo, SonarFault> {
     match range_cm {
-        NOTHING_HEARD_CM => Ok(Echo::Silence),
-        NEAREST_CM..NOTHING_HEARD_CM => Ok(Echo::Range { range_mm: range_cm * 10 }),
+        NO_ECHO_CM => Ok(Echo::Silence),
+        MIN_RANGE_CM..NO_ECHO_CM => Ok(Echo::Range { range_mm: range_cm * 10 }),
         _ => Err(SonarFault::OutOfRange),
     }
 }
@@ -81,18 +81,18 @@ impl<const SONARS: usize> I2cRanger<SONARS> for MaxBotixConfig<SONARS> {
 
     fn timing(&self) -> RangingTiming {
         let cycle_us = u32::from(self.cycle_ms) * 1000;
-        let first_ask_us = u32::from(self.ranging_ms) * 1000;
-        RangingTiming { first_ask_us, poll_interval_us: POLL_INTERVAL_US, timeout_us: cycle_us, cycle_us }
+        let first_poll_us = u32::from(self.ranging_ms) * 1000;
+        RangingTiming { first_poll_us, poll_interval_us: POLL_INTERVAL_US, timeout_us: cycle_us, cycle_us }
     }
 
     fn start<BUS: I2c>(&self, bus: &mut BUS, address: u8) -> Result<(), BUS::Error> {
-        bus.write(address, &[TAKE_A_RANGE])
+        bus.write(address, &[START_MEASUREMENT])
     }
 
-    fn ask<BUS: I2c>(&self, bus: &mut BUS, address: u8) -> Result<Reading, BUS::Error> {
+    fn poll<BUS: I2c>(&self, bus: &mut BUS, address: u8) -> Result<Reading, BUS::Error> {
         let mut range_cm = [0; 2];
         bus.read(address, &mut range_cm)?;
-        Ok(Reading::Settled(echo(u16::from_be_bytes(range_cm))))
+        Ok(Reading::Done(echo(u16::from_be_bytes(range_cm))))
     }
 }
 
@@ -119,7 +119,7 @@ impl core::error::Error for MaxBotixConfigError {}
 
 /// A ring of `SONARS` I2CXL-MaxSonar at consecutive addresses of one I2C bus.
 ///
-/// A frame takes `cycle_ms` for each firing group, whatever the sensors do, and the time on the bus.
+/// A frame takes `cycle_ms` for each firing group, plus the time on the bus.
 pub type MaxBotixRing<BUS, DELAY, const SONARS: usize> = I2cRing<BUS, DELAY, MaxBotixConfig<SONARS>, SONARS>;
 
 #[cfg(test)]

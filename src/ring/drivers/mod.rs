@@ -1,19 +1,37 @@
-//! Drivers that read a ring of sonars over `embedded-hal` traits.
+//! Drivers for rings of range sensors, over the traits of `embedded-hal`.
 //!
-//! | Sensor | Ring | Bus |
-//! |---|---|---|
-//! | Devantech SRF08, SRF10 | [`Srf08Ring`] | any I2C bus |
-//! | MaxBotix I2CXL-MaxSonar | [`MaxBotixRing`] | any I2C bus |
-//! | HC-SR04 | [`HcSr04Ring`] | two pins each, and a clock of microseconds |
+//! | Sensor | Ring | Bus | File |
+//! |---|---|---|---|
+//! | Devantech SRF08, SRF10 | [`Srf08Ring`] | any I2C bus | `srf08.rs` |
+//! | MaxBotix I2CXL-MaxSonar | [`MaxBotixRing`] | any I2C bus | `maxbotix.rs` |
+//! | HC-SR04 | [`HcSr04Ring`] | two pins for each sensor, and a microsecond clock | `hcsr04.rs` |
 //!
-//! [`Sc18im700`] makes an I2C bus out of a UART. Another sensor on I2C needs an [`I2cRanger`] for an [`I2cRing`]; any other
-//! one needs a [`SonarRing`]. `docs/wiring.md` shows how the rings are wired.
+//! [`Sc18im700`] is an I2C bus behind a UART. `docs/wiring.md` shows how to wire each ring.
 //!
-//! A ring fires in the groups of its [`FiringPlan`], blocks until its frame is whole, and always gives a frame in bounded
-//! time, however many of its sensors are dead. Sensors come from the factory with one address for all;
-//! [`change_srf08_address`] and [`change_maxbotix_address`] set them apart.
+//! The sensors of a ring fire in the groups of its [`FiringPlan`]. [`SonarRing::read`] blocks until the frame is complete.
+//! Every wait has a timeout, so it returns in bounded time, however many sensors are dead. I2C sensors have the same address
+//! when new; [`change_srf08_address`] and [`change_maxbotix_address`] change it.
 //!
-//! Whatever gives a frame is a ring; here one that hears the same again and again:
+//! # How to add a sensor
+//!
+//! One sensor is one file.
+//!
+//! - **A sensor on I2C**: copy `maxbotix.rs`, the shortest driver. Write a config struct with `DEFAULT` values from the data
+//!   sheet, and implement [`I2cRanger`] for it: the messages that start a measurement and read it, and the times between
+//!   them. [`I2cRing`] does the rest: firing groups, polling, timeouts and fault counting.
+//! - **Any other sensor**: implement [`SonarRing`], here or in another crate. `hcsr04.rs` is an example.
+//!
+//! Then:
+//!
+//! 1. State the data sheet in the first lines of the file. An echo outside its limits is [`SonarFault::OutOfRange`]; the
+//!    code for "no echo" is [`Echo::Silence`](crate::ring::Echo::Silence).
+//! 2. Declare the file in this module and add a line to the table above.
+//! 3. Write a model of the sensor in `host/sim/src/chip`, and test the driver against it in `host-tests/tests/sonar`: valid
+//!    ranges, each fault, and the bound of the waiting time.
+//! 4. Add the driver to the fuzz target `ring_drivers` and to the no-panic proof (`src/bin/proof/ring.rs`).
+//! 5. Document the wiring and the duration of a frame in `docs/wiring.md`.
+//!
+//! A ring that returns constant ranges:
 //!
 //! ```
 //! use toposlam::FaultCounters;
@@ -38,66 +56,67 @@
 //!
 //! # VL53L1X
 //!
-//! There is no driver for this time-of-flight sensor, because no crate fits. Of those on crates.io, `vl53l1x` 1.2.0 needs
-//! `std` and compiles C code for Linux; `vl53l1x-uld` 2.0.1 and `vl53l1` 0.1.2 are made for `embedded-hal` 0.2.
-//! `vl53l1x-simple` 0.2.0 is for `embedded-hal` 1.0 without `std`, but it divides by a number that it reads from the sensor,
-//! so that a sensor or a bus that answers 0 makes it panic, and it withholds the status of a range, so that "nothing in
-//! sight" comes as a range. A ring of such sensors can still be a [`SonarRing`] of its own.
+//! There is no driver for this time-of-flight sensor because no published crate fits. `vl53l1x` 1.2.0 needs `std` and
+//! compiles C code for Linux. `vl53l1x-uld` 2.0.1 and `vl53l1` 0.1.2 are for `embedded-hal` 0.2. `vl53l1x-simple` 0.2.0 is
+//! for `embedded-hal` 1.0 without `std`, but it divides by a number that it reads from the sensor, so a sensor or a bus that
+//! answers 0 makes it panic; and it does not return the status of a range, so "no target" is reported as a range.
 
 use core::fmt;
 
 use crate::{FaultCounters, FaultKind, ring::RingFrame};
 
 mod address;
+mod firing;
 mod hcsr04;
 mod i2c_ring;
 mod maxbotix;
-mod plan;
-mod round;
+mod reading;
 mod sc18im700;
 mod sound;
 mod srf08;
 
 pub use address::{AddressError, change_maxbotix_address, change_srf08_address};
-pub use hcsr04::{HcSr04Config, HcSr04ConfigError, HcSr04Ring, Microseconds};
+pub use firing::FiringPlan;
+pub use hcsr04::{HcSr04Config, HcSr04ConfigError, HcSr04Ring, MicrosecondClock};
 pub use i2c_ring::{I2cRanger, I2cRing, RangingTiming};
 pub use maxbotix::{MaxBotixConfig, MaxBotixConfigError, MaxBotixRing};
-pub use plan::FiringPlan;
-pub use round::Reading;
+pub use reading::Reading;
 pub use sc18im700::{BridgeError, Sc18im700};
 pub use srf08::{Srf08Config, Srf08ConfigError, Srf08Ring};
 
-/// A ring of `SONARS` sonars that can be read, one frame after the other.
+/// A ring of `SONARS` range sensors.
 pub trait SonarRing<const SONARS: usize> {
-    /// Reads every sensor once. There is always a frame: a sensor in trouble is [`Echo::Dead`](crate::ring::Echo::Dead)
-    /// in it and counted in `faults`, and the others go on. [`RingFrame::dead_sensors`] says which they are.
+    /// Measures with every sensor once, and returns the frame. Blocks for a bounded time.
+    ///
+    /// A sensor that fails is [`Echo::Dead`](crate::ring::Echo::Dead) in the frame and recorded in `faults`; the others are
+    /// read all the same. [`RingFrame::dead_sensors`] lists those that failed.
     fn read(&mut self, faults: &mut FaultCounters) -> RingFrame<SONARS>;
 
-    /// The last trouble of the latest frame, for a log; `None` after a frame without any.
+    /// Returns the last fault of the newest frame, for a log; `None` when all sensors worked.
     fn last_error(&self) -> Option<SonarError>;
 }
 
-/// What went wrong with one sensor of a ring.
+/// A fault of one sensor of a ring.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct SonarError {
-    /// The sensor's index in the frame.
+    /// Index of the sensor in the frame.
     pub sensor: u8,
-    /// What it did.
+    /// What failed.
     pub fault: SonarFault,
 }
 
-/// How a sensor can fail to say anything about the world.
+/// Why a sensor gave no valid measurement.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum SonarFault {
-    /// It did not acknowledge its address, or was still ranging when the time was up.
+    /// It did not acknowledge its address, or did not complete the measurement before the timeout.
     Silent,
-    /// It answered with a range that its data sheet does not allow.
+    /// Its range is outside the limits of the data sheet.
     OutOfRange,
-    /// The bus, or the pin, failed while the sensor was addressed.
+    /// The bus or the pin failed.
     Bus,
-    /// Its line was up before it was asked: it hangs, or the wire has a fault.
+    /// Its echo line was high before the trigger: the sensor hangs, or the wire is faulty.
     Stuck,
-    /// The clock that times its echo stands still.
+    /// The clock that times the echo does not advance.
     Clock,
 }
 
@@ -115,11 +134,11 @@ impl SonarFault {
 impl fmt::Display for SonarError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let what = match self.fault {
-            SonarFault::Silent => "did not answer in time",
-            SonarFault::OutOfRange => "answered with an impossible range",
-            SonarFault::Bus => "could not be reached: bus or pin error",
-            SonarFault::Stuck => "holds its line high before it is asked",
-            SonarFault::Clock => "could not be timed: the clock stands still",
+            SonarFault::Silent => "timed out",
+            SonarFault::OutOfRange => "returned a range outside its limits",
+            SonarFault::Bus => "is not reachable: bus or pin error",
+            SonarFault::Stuck => "holds its echo line high before the trigger",
+            SonarFault::Clock => "cannot be timed: the clock does not advance",
         };
         write!(f, "sonar {} {what}", self.sensor)
     }

@@ -1,9 +1,9 @@
-//! The SC18IM700 UART-to-I2C bridge: an I2C bus for a board that has only a UART to spare.
+//! NXP SC18IM700 UART-to-I2C bridge: an I2C bus for a board with a free UART and no free I2C peripheral.
 //!
-//! Source: NXP, *SC18IM700, Master I2C-bus controller with UART interface*, rev. 2, and application note AN10397. The
-//! chip reads ASCII messages: `S` address-with-direction count data… `P` is one bus message; another `S` in place of
-//! the `P` is a repeated start; `R` register… `P` reads and `W` register value … `P` writes the chip's own registers. Its
-//! buffers hold 16 bytes. It starts at 9600 baud, 8 data bits, no parity, one stop bit.
+//! Source: NXP, *SC18IM700, Master I2C-bus controller with UART interface*, rev. 2, and application note AN10397. The chip
+//! takes ASCII commands. `S` address-with-direction count data… `P` is a bus message; another `S` in place of the `P` is a
+//! repeated start. `R` register… `P` reads and `W` register value … `P` writes the chip's own registers. Its buffers are 16
+//! bytes long. It starts at 9600 baud, 8 data bits, no parity, one stop bit.
 
 use core::fmt;
 
@@ -30,27 +30,26 @@ const STATUS_ADDRESS_NOT_ACKNOWLEDGED: u8 = 0xF1;
 const STATUS_DATA_NOT_ACKNOWLEDGED: u8 = 0xF2;
 const STATUS_TIMEOUT: u8 = 0xF8;
 
-/// The chip's own address after a reset; it is written again so that it can serve as a marker.
+/// The chip's own address after a reset. It is written again so that it can serve as a marker.
 const OWN_ADDRESS_MARKER: u8 = 0x26;
-/// The reset value 0x66 with the enable bit, so that a stuck bus ends in [`STATUS_TIMEOUT`].
+/// The reset value 0x66 with the enable bit set, so that a stuck bus ends in [`STATUS_TIMEOUT`].
 const BUS_TIMEOUT_MARKER: u8 = 0x67;
 
 const BUFFER_BYTES: usize = 16;
 /// Data, status and the two markers.
 const REPLY_BYTES: usize = BUFFER_BYTES + 3;
-/// What the chip says while a message still goes out.
+/// Bytes that may arrive while a message is sent.
 const EARLY_BYTES: usize = 32;
 const CRYSTAL_HZ: u32 = 7_372_800;
 
-/// An SC18IM700 on a UART, as an I2C bus with 7-bit addresses.
+/// An SC18IM700 on a UART: an I2C bus with 7-bit addresses.
 ///
-/// After each message the driver asks for the bus status. The status of a failed read comes without data before it and
-/// may be mistaken for data, so when the first byte could be either, the driver asks for two registers of known content
-/// and sees where they come, instead of waiting for silence. (A read that succeeds and begins with a failure code followed
-/// by both, say 0xF1 0x26 0x67, is taken for a failure.)
+/// After each message the driver reads the bus status. A failed read returns the status without data before it. Where the
+/// first byte may be either, the driver reads two registers of known content, and their position decides. (A successful
+/// read whose data begins with a failure code and both contents, for example 0xF1 0x26 0x67, is taken for a failure.)
 ///
-/// Each byte is waited for with a budget of polls, so no call lasts longer than its bytes times the budget. A message has
-/// at most 16 bytes to write and 16 to read; adjacent operations of the same kind count as one, as `embedded-hal` wants it.
+/// Each byte has a budget of polls, so a call takes at most its number of bytes times the budget. A message writes at most 16
+/// bytes and reads at most 16. Adjacent operations of the same kind are merged, as `embedded-hal` requires.
 #[derive(Debug)]
 pub struct Sc18im700<UART> {
     uart: UART,
@@ -59,26 +58,26 @@ pub struct Sc18im700<UART> {
 }
 
 impl<UART: Read<u8> + Write<u8>> Sc18im700<UART> {
-    /// A bridge on a UART. `poll_budget` is how often the UART may say "not yet" for one byte before the bridge counts
-    /// as silent: at least the duration of 40 bytes on the UART and of 20 on the bus, in turns of a tight loop.
+    /// Creates a bridge. `poll_budget` is how many times in a row the UART may return `WouldBlock` for one byte: at least the
+    /// duration of 40 bytes on the UART plus 20 on the bus, in polls.
     pub const fn new(uart: UART, poll_budget: u32) -> Self {
         Self { uart, poll_budget, early: Deque::new() }
     }
 
-    /// Sets the chip up: its bus time-out, and the register that marks the end of a reply. Call it once before use.
+    /// Configures the chip: its bus timeout, and the registers that mark the end of a reply. Call it once before use.
     ///
     /// # Errors
-    /// [`BridgeError::Silent`] or [`BridgeError::Line`] when the UART does not take the message.
+    /// [`BridgeError::Silent`] or [`BridgeError::Line`] when the UART does not accept the message.
     pub fn start(&mut self) -> Result<(), BridgeError> {
         self.discard_stale();
         self.send(&[WRITE_REGISTER, OWN_ADDRESS, OWN_ADDRESS_MARKER, BUS_TIMEOUT, BUS_TIMEOUT_MARKER, STOP])?;
         self.flush()
     }
 
-    /// Tells the chip its next line speed; the UART has to follow (`release`, set it up anew, `new`).
+    /// Changes the chip's baud rate, 113 to 460,800. The UART must follow: `release` it, configure it, and call `new`.
     ///
     /// # Errors
-    /// [`BridgeError::BaudRate`] when the chip has no divider for it: 113 to 460,800 baud.
+    /// [`BridgeError::BaudRate`] when the chip has no divider for the rate.
     pub fn set_baud_rate(&mut self, baud: u32) -> Result<(), BridgeError> {
         let divider = CRYSTAL_HZ.checked_div(baud).and_then(|divider| divider.checked_sub(16));
         let divider = divider.and_then(|divider| u16::try_from(divider).ok()).ok_or(BridgeError::BaudRate)?;
@@ -87,7 +86,7 @@ impl<UART: Read<u8> + Write<u8>> Sc18im700<UART> {
         self.flush()
     }
 
-    /// Gives the UART back.
+    /// Returns the UART.
     pub fn release(self) -> UART {
         self.uart
     }
@@ -102,7 +101,7 @@ impl<UART: Read<u8> + Write<u8>> Sc18im700<UART> {
         }
     }
 
-    /// Sends bytes, and keeps what arrives meanwhile: most UARTs hold one byte and drop the next.
+    /// Sends bytes, and stores what arrives meanwhile: most UARTs buffer one byte only.
     fn send(&mut self, bytes: &[u8]) -> Result<(), BridgeError> {
         for &byte in bytes {
             self.send_byte(byte)?;
@@ -174,7 +173,7 @@ impl<UART: Read<u8> + Write<u8>> Sc18im700<UART> {
         self.send(&[STOP, READ_REGISTER, BUS_STATUS, STOP])
     }
 
-    /// The data of a message that went well.
+    /// The data of a successful message.
     fn receive_reply(&mut self, data_bytes: usize) -> Result<Vec<u8, REPLY_BYTES>, BridgeError> {
         let mut reply: Vec<u8, REPLY_BYTES> = Vec::new();
         let mut expected = data_bytes.saturating_add(1);
@@ -182,7 +181,7 @@ impl<UART: Read<u8> + Write<u8>> Sc18im700<UART> {
             let byte = self.receive()?;
             reply.push(byte).map_err(|_| BridgeError::TooLong)?;
             match *reply.as_slice() {
-                // Either data or the status of a read that gave none: ask for two bytes that are known.
+                // Either data or the status of a failed read: read two registers of known content.
                 [first] if data_bytes > 0 && is_failure(first) => {
                     self.send(&[READ_REGISTER, OWN_ADDRESS, BUS_TIMEOUT, STOP])?;
                     expected = expected.saturating_add(2);
@@ -261,19 +260,19 @@ impl<UART: Read<u8> + Write<u8>> I2c for Sc18im700<UART> {
 pub enum BridgeError {
     /// No device acknowledged the address.
     AddressNotAcknowledged,
-    /// The device refused a byte of data.
+    /// The device did not acknowledge a data byte.
     DataNotAcknowledged,
-    /// The bus was stuck until the chip gave up.
+    /// The bus was stuck until the chip's timeout.
     BusTimeout,
-    /// The bridge did not answer within the budget of polls.
+    /// The bridge did not answer within the poll budget.
     Silent,
     /// The UART reported an error: overrun, framing, noise or parity.
     Line,
-    /// The bridge's reply is not one that it can give: bytes were lost or added.
+    /// The reply is invalid: bytes were lost or added.
     OutOfStep,
     /// More than 16 bytes in one direction.
     TooLong,
-    /// The chip has no divider for this line speed.
+    /// The chip has no divider for this baud rate.
     BaudRate,
 }
 
@@ -293,13 +292,13 @@ impl fmt::Display for BridgeError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(match self {
             Self::AddressNotAcknowledged => "no device acknowledged the address",
-            Self::DataNotAcknowledged => "the device refused a byte",
-            Self::BusTimeout => "the bus was stuck",
+            Self::DataNotAcknowledged => "the device did not acknowledge a data byte",
+            Self::BusTimeout => "the bus is stuck",
             Self::Silent => "the bridge does not answer",
-            Self::Line => "the line to the bridge had an error",
-            Self::OutOfStep => "the bridge's reply makes no sense",
+            Self::Line => "UART error on the line to the bridge",
+            Self::OutOfStep => "the reply of the bridge is invalid",
             Self::TooLong => "more than 16 bytes in one direction",
-            Self::BaudRate => "no divider for this line speed",
+            Self::BaudRate => "no divider for this baud rate",
         })
     }
 }

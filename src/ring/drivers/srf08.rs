@@ -1,9 +1,9 @@
-//! A ring of up to 16 SRF08 or SRF10 ultrasonic rangers on one I2C bus.
+//! Devantech SRF08 and SRF10 ultrasonic rangers: up to 16 on one I2C bus.
 //!
-//! Source: Devantech, *SRF08 Ultra sonic range finder, Technical Specification*, and the same of the SRF10. Register 0 is
-//! the command when written and the software revision when read; while the ranger listens for its echo it does not
-//! answer, and the released bus reads as 255. Register 1 is the light sensor (the SRF10 has none), registers 2 and 3 the
-//! first echo, high byte first, 0 for no echo. A command written to address 0 starts every SRF08 on the bus.
+//! Source: Devantech, *SRF08 Ultra sonic range finder, Technical Specification*, and the same for the SRF10. Register 0 is
+//! the command register when written and the software revision when read. During a measurement the ranger does not
+//! drive the bus, so the revision reads as 255. Register 1 is the light sensor (the SRF10 has none). Registers 2 and 3 are
+//! the first echo, high byte first, 0 without an echo. A command to address 0 starts every SRF08 on the bus.
 
 use core::{fmt, ops::RangeInclusive};
 
@@ -16,39 +16,39 @@ use super::{
 };
 use crate::ring::Echo;
 
-/// Every ranger on the bus listens to this address as well.
+/// All SRF08 on the bus listen to this address.
 const GENERAL_CALL: u8 = 0;
 const COMMAND_REGISTER: u8 = 0;
-const REVISION_WHILE_RANGING: u8 = 255;
-/// Start a ranging and report the time of flight in microseconds: the finest of the three units.
+const REVISION_WHILE_BUSY: u8 = 255;
+/// Starts a measurement with the result in microseconds, the finest of the three units.
 const RANGE_IN_MICROSECONDS: u8 = 0x52;
-/// The 7-bit addresses that these rangers can have.
+/// The 7-bit addresses of these rangers.
 pub(super) const ADDRESSES: RangeInclusive<u8> = 0x70..=0x7F;
 
-/// How a ring of SRF08 or SRF10 is wired and read.
+/// Addresses, firing plan, times and range limits of a ring of SRF08 or SRF10.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Srf08Config<const SONARS: usize> {
-    /// The 7-bit address of sensor 0; sensor *i* is at this plus *i*. 0x70 to 0x7F, default 0x70.
+    /// 7-bit address of sensor 0, 0x70 to 0x7F; sensor *i* has this address plus *i*. Default 0x70.
     pub first_address: u8,
-    /// Which sensors fire together. Default: two groups, even and odd.
+    /// Which sensors fire together. Default: two groups, even and odd indices.
     pub plan: FiringPlan<SONARS>,
-    /// Whether one write to address 0 starts all sensors when the plan fires them together, which is faster than one
-    /// write each. Default true; the SRF10 is not said to listen to it.
+    /// Whether one message to address 0 starts all sensors when the plan fires them together. Default true. The data sheet
+    /// of the SRF10 does not mention this address.
     pub has_general_call: bool,
-    /// How long a group may take from its start, in milliseconds, at least 1. Default 100: a ranging lasts 65.
+    /// Timeout of a firing group, in milliseconds, at least 1. Default 100; a measurement takes 65.
     pub timeout_ms: u16,
-    /// How long to wait between two rounds of asking, in microseconds, at least 1. Default 2000.
+    /// Time between two polls of a sensor, in microseconds, at least 1. Default 2000.
     pub poll_interval_us: u16,
-    /// Speed of sound in metres per second, 300 to 400. Default 343, dry air of 20 °C.
+    /// Speed of sound in metres per second, 300 to 400. Default 343: dry air at 20 °C.
     pub speed_of_sound_m_per_s: u16,
-    /// The shortest range to believe, in millimetres. Default 30, from the data sheet.
+    /// Minimum valid range, in millimetres. Default 30, from the data sheet.
     pub min_range_mm: u16,
-    /// The longest range to believe, in millimetres. Default 6000, from the data sheet.
+    /// Maximum valid range, in millimetres. Default 6000, from the data sheet.
     pub max_range_mm: u16,
 }
 
 impl<const SONARS: usize> Srf08Config<SONARS> {
-    /// The SRF08's data sheet, two firing groups.
+    /// The values of the SRF08's data sheet, two firing groups.
     pub const DEFAULT: Self = Self {
         first_address: 0x70,
         plan: FiringPlan::interleaved(2),
@@ -60,10 +60,10 @@ impl<const SONARS: usize> Srf08Config<SONARS> {
         max_range_mm: 6000,
     };
 
-    /// The same for the SRF10, which has no light sensor, keeps silent on the bus while it ranges, and is started alone.
+    /// The same for the SRF10, without the common address.
     pub const SRF10: Self = Self { has_general_call: false, ..Self::DEFAULT };
 
-    /// What the microseconds of the first echo mean.
+    /// Converts the time of the first echo to a range.
     fn echo(&self, flight_us: u16) -> Result<Echo, SonarFault> {
         if flight_us == 0 {
             return Ok(Echo::Silence);
@@ -114,10 +114,10 @@ impl<const SONARS: usize> I2cRanger<SONARS> for Srf08Config<SONARS> {
     fn timing(&self) -> RangingTiming {
         let poll_interval_us = self.poll_interval_us.into();
         let timeout_us = u32::from(self.timeout_ms) * 1000;
-        RangingTiming { first_ask_us: poll_interval_us, poll_interval_us, timeout_us, cycle_us: 0 }
+        RangingTiming { first_poll_us: poll_interval_us, poll_interval_us, timeout_us, cycle_us: 0 }
     }
 
-    fn address_of_all(&self) -> Option<u8> {
+    fn broadcast_address(&self) -> Option<u8> {
         self.has_general_call.then_some(GENERAL_CALL)
     }
 
@@ -125,15 +125,15 @@ impl<const SONARS: usize> I2cRanger<SONARS> for Srf08Config<SONARS> {
         bus.write(address, &[COMMAND_REGISTER, RANGE_IN_MICROSECONDS])
     }
 
-    /// One read tells both whether the sensor is done and what it heard.
-    fn ask<BUS: I2c>(&self, bus: &mut BUS, address: u8) -> Result<Reading, BUS::Error> {
-        let mut registers = [REVISION_WHILE_RANGING; 4];
+    /// One message reads the revision, which shows whether the sensor is done, and the first echo.
+    fn poll<BUS: I2c>(&self, bus: &mut BUS, address: u8) -> Result<Reading, BUS::Error> {
+        let mut registers = [REVISION_WHILE_BUSY; 4];
         bus.write_read(address, &[COMMAND_REGISTER], &mut registers)?;
         let [revision, _light, high, low] = registers;
-        Ok(if revision == REVISION_WHILE_RANGING {
-            Reading::Ranging
+        Ok(if revision == REVISION_WHILE_BUSY {
+            Reading::Pending
         } else {
-            Reading::Settled(self.echo(u16::from_be_bytes([high, low])))
+            Reading::Done(self.echo(u16::from_be_bytes([high, low])))
         })
     }
 }
@@ -168,10 +168,9 @@ impl fmt::Display for Srf08ConfigError {
 
 impl core::error::Error for Srf08ConfigError {}
 
-/// A ring of `SONARS` SRF08, or SRF10, at consecutive addresses of one I2C bus, at most 16.
+/// A ring of `SONARS` SRF08 or SRF10 at consecutive addresses of one I2C bus, at most 16.
 ///
-/// A frame takes one ranging (65 ms on the real sensors) for each firing group, and at most `timeout_ms` of waiting for
-/// each.
+/// A frame takes one measurement (65 ms by the data sheet) for each firing group, and waits at most `timeout_ms` for each.
 pub type Srf08Ring<BUS, DELAY, const SONARS: usize> = I2cRing<BUS, DELAY, Srf08Config<SONARS>, SONARS>;
 
 #[cfg(test)]
@@ -179,7 +178,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn every_believable_range_survives_the_sensors_unit() {
+    fn every_valid_range_is_exact_in_the_unit_of_the_sensor() {
         let config = Srf08Config::<16>::DEFAULT;
         for range_mm in config.min_range_mm..=config.max_range_mm {
             let flight_us = (u32::from(range_mm) * 2000 + 171) / 343;
@@ -188,7 +187,7 @@ mod tests {
     }
 
     #[test]
-    fn what_the_data_sheet_does_not_allow_is_nonsense_and_zero_is_silence() {
+    fn a_time_outside_the_data_sheet_is_out_of_range_and_zero_is_silence() {
         let config = Srf08Config::<16>::DEFAULT;
         assert_eq!(config.echo(0), Ok(Echo::Silence));
         for flight_us in [1, 160, 35_000, u16::MAX] {

@@ -14,7 +14,7 @@ use toposlam_sim::world::{Plan, Report, RobotModel};
 
 use super::drive::{fault_rate, load_plan, noise_factor};
 
-/// A journey that takes more ring frames is given up.
+/// A goal_status that takes more ring frames is given up.
 const FRAMES_PER_JOURNEY: u64 = 20_000;
 
 /// Arguments of `toposlam explore`.
@@ -128,10 +128,10 @@ fn one(arguments: &Arguments, plan: &Plan, noise: f64, seed: u64) -> anyhow::Res
 fn travel(exploration: &mut Exploration<'_>, journeys: u64, seed: u64) -> Journeys {
     let mut outcome = Journeys::default();
     for number in 0..journeys {
-        let vertices = exploration.robot().mapper().map().vertices();
-        let here = exploration.steps().last().map(|step| step.update.vertex);
+        let vertices = exploration.robot().mapper().map().vertices().len() as u64;
+        let here = exploration.steps().last().map(|step| u8::from(step.update.vertex));
         // Any other vertex, by the seed.
-        let vertex = ((seed + 7 * number) % u64::from(vertices.max(1))) as u8;
+        let vertex = ((seed + 7 * number) % vertices.max(1)) as u8;
         if Some(vertex) == here {
             continue;
         }

@@ -58,7 +58,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     let mut layout = Layout::new();
     layout.arrange(&map);
     let points = layout.points();
-    let here = listener.picture().location().map(|location| location.vertex);
+    let here = listener.replica().location().map(|location| location.vertex);
     let text = match arguments.format {
         Format::Graphml => export::graphml(&map, points, here),
         Format::Dot => export::dot(&map, points, here),
@@ -124,7 +124,7 @@ fn replayed(_: &Path) -> anyhow::Result<Listener> {
 }
 
 fn complain_of_gaps(listener: &Listener) {
-    if !listener.picture().is_complete() || !listener.picture().is_converged() {
+    if !listener.replica().is_complete() || !listener.replica().is_converged() {
         eprintln!("the map was not heard whole: vertices or edges may be missing");
     }
 }

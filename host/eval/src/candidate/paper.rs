@@ -8,7 +8,7 @@ use crate::{
     trial::Trial,
 };
 use std::ptr;
-use toposlam::{Config, FaultKind, Fingerprint, Map, Observation, PaperFilter, Prior};
+use toposlam::{Config, FaultKind, Fingerprint, Map, Observation, PaperFilter, Prior, VertexId};
 
 /// How many places a path can visit without a prior.
 pub(super) const MAX_PLACES: usize = 2048;
@@ -46,7 +46,7 @@ impl<const WORDS: usize> Particles<WORDS> {
 
     fn advance(&mut self) {
         let particles = self.filter.particles().iter();
-        self.ancestry.advance(particles.map(|particle| (particle.parent.into(), particle.place.into())));
+        self.ancestry.advance(particles.map(|particle| (particle.parent.into(), particle.at.into())));
     }
 
     /// The newest vertices that the best particle visited.
@@ -75,7 +75,7 @@ impl<const WORDS: usize> Candidate for Online<WORDS> {
 
     fn polish(&mut self, _slices: u32) {}
 
-    fn search_from(&self, _path: &[u8], _slices: u32) -> Option<(Map<VERTICES>, Vec<usize>)> {
+    fn search_from(&self, _path: &[VertexId], _slices: u32) -> Option<(Map<VERTICES>, Vec<usize>)> {
         None
     }
 
@@ -112,7 +112,7 @@ impl<const WORDS: usize> Candidate for Informed<WORDS> {
 
     fn polish(&mut self, _slices: u32) {}
 
-    fn search_from(&self, _path: &[u8], _slices: u32) -> Option<(Map<VERTICES>, Vec<usize>)> {
+    fn search_from(&self, _path: &[VertexId], _slices: u32) -> Option<(Map<VERTICES>, Vec<usize>)> {
         None
     }
 

@@ -3,7 +3,7 @@
 use std::{cell::Cell, rc::Rc};
 
 use embedded_hal::delay::DelayNs;
-use toposlam::ring::drivers::Microseconds;
+use toposlam::ring::drivers::MicrosecondClock;
 
 /// Simulated time, shared by its clones: the drivers wait with it and read it, the models act by it.
 #[derive(Clone, Debug)]
@@ -31,7 +31,7 @@ impl DelayNs for SimulatedTime {
     }
 }
 
-impl Microseconds for SimulatedTime {
+impl MicrosecondClock for SimulatedTime {
     fn now_us(&mut self) -> u32 {
         self.now_ns.set(self.now_ns.get() + self.look_ns);
         // It starts again at 0, as the driver expects.
