@@ -2,20 +2,20 @@
 //!
 //! ```
 //! use toposlam_eval::mapping::{FilterChoice, Mapping};
-//! use toposlam_sim::world::{Journal, Plan, RobotModel, Simulation};
+//! use toposlam_sim::world::{GroundTruth, Plan, RobotModel, Simulation};
 //!
 //! let plan = Plan::built_in("ring").expect("it is built in");
 //! let mut simulation = Simulation::new(&plan, RobotModel::default(), 7)?;
-//! let mut journal = Journal::new(simulation.true_map());
+//! let mut ground_truth = GroundTruth::new(simulation.true_map());
 //! let mut mapping = Mapping::reference(FilterChoice::Robust)?;
 //! while mapping.steps().len() < 20 {
 //!     let (frame, truth) = simulation.next().expect("a simulation does not end");
-//!     journal.drive(&truth);
+//!     ground_truth.drive(&truth);
 //!     if let Some(step) = mapping.observe(&frame, truth.turn) {
-//!         journal.detect(&step.place);
+//!         ground_truth.detect(&step.place);
 //!     }
 //! }
-//! let nodes: Vec<Option<usize>> = journal.detections().iter().map(|detection| detection.node).collect();
+//! let nodes: Vec<Option<usize>> = ground_truth.detections().iter().map(|detection| detection.node).collect();
 //! assert!(mapping.score(simulation.true_map(), &nodes).location > 0.5);
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```

@@ -21,12 +21,12 @@ const BUFFER_BYTES: usize = 4096;
 ///
 /// ```no_run
 /// use toposlam::wire::Command;
-/// use toposlam_link::{client::Client, line, wording};
+/// use toposlam_link::{client::Client, line, event_text};
 ///
 /// let robot = line::open("tcp:127.0.0.1:7070", 115_200)?;
 /// let mut client = Client::new(robot, 1, |_, _| ());
 /// println!("{} vertices", client.map()?.vertices());
-/// println!("{}", wording::outcome(&client.request(Command::GoTo { vertex: 0 })?));
+/// println!("{}", event_text::outcome(&client.request(Command::GoTo { vertex: 0 })?));
 /// std::fs::write("office.map", client.snapshot()?)?;
 /// # Ok::<(), anyhow::Error>(())
 /// ```

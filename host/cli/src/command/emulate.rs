@@ -30,25 +30,25 @@ const IMAGE: &str = "thumbv7em-none-eabihf/firmware/robot";
 pub(crate) struct Arguments {
     #[command(flatten)]
     drive: DriveArguments,
-    /// Drive until this many places were detected.
+    /// Stop after this many detected places.
     #[arg(long, default_value_t = 30)]
     places: usize,
-    /// The firmware image; built with `cargo firmware` when it is not given.
-    #[arg(long)]
+    /// Firmware image [default: built with `cargo firmware`].
+    #[arg(long, value_name = "FILE")]
     elf: Option<PathBuf>,
-    /// The emulator.
-    #[arg(long, default_value = "qemu-system-arm")]
+    /// Emulator to run.
+    #[arg(long, value_name = "PROGRAM", default_value = "qemu-system-arm")]
     qemu: PathBuf,
-    /// Give up after this many seconds.
-    #[arg(long, default_value_t = 800)]
+    /// Timeout of the whole run, in seconds.
+    #[arg(long, value_name = "SECONDS", default_value_t = 800)]
     timeout_s: u64,
-    /// Faults of the sensor bus and the line, 0 to 1: the probability that a transfer is refused; the others follow
-    /// (docs/faults.md). With faults the map is held to the truth, and not to this computer's.
-    #[arg(long, default_value_t = 0.0, value_parser = fault_rate)]
+    /// Fault rate of the sensor bus and the line, 0 to 1: the probability that a bus transfer fails. Every other rate is proportional to
+    /// it (docs/faults.md). With faults, the map is compared with the ground truth and not with that of `simulate`.
+    #[arg(long, value_name = "RATE", default_value_t = 0.0, value_parser = fault_rate)]
     faults: f64,
 }
 
-/// So long the world waits for the firmware to say where it drives.
+/// How long the world waits for the velocity command of the firmware.
 const VELOCITY_TIMEOUT: Duration = Duration::from_secs(10);
 
 /// The same robot on this computer, and where it wanted to go after each frame.

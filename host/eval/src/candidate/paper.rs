@@ -73,9 +73,9 @@ impl<const WORDS: usize> Candidate for Online<WORDS> {
         self.0.advance();
     }
 
-    fn polish(&mut self, _slices: u32) {}
+    fn refine(&mut self, _steps: u32) {}
 
-    fn search_from(&self, _path: &[VertexId], _slices: u32) -> Option<(Map<VERTICES>, Vec<usize>)> {
+    fn search_from(&self, _path: &[VertexId], _steps: u32) -> Option<(Map<VERTICES>, Vec<usize>)> {
         None
     }
 
@@ -110,9 +110,9 @@ impl<const WORDS: usize> Candidate for Informed<WORDS> {
         self.particles.advance();
     }
 
-    fn polish(&mut self, _slices: u32) {}
+    fn refine(&mut self, _steps: u32) {}
 
-    fn search_from(&self, _path: &[VertexId], _slices: u32) -> Option<(Map<VERTICES>, Vec<usize>)> {
+    fn search_from(&self, _path: &[VertexId], _steps: u32) -> Option<(Map<VERTICES>, Vec<usize>)> {
         None
     }
 

@@ -42,14 +42,14 @@ impl<const N: usize, const HISTORY: usize> Candidate for Robust<N, HISTORY> {
         self.0.observe(observation);
     }
 
-    fn polish(&mut self, slices: u32) {
-        (0..slices).for_each(|_| self.0.polish());
+    fn refine(&mut self, steps: u32) {
+        (0..steps).for_each(|_| self.0.polish());
     }
 
-    fn search_from(&self, path: &[VertexId], slices: u32) -> Option<(Map<VERTICES>, Vec<usize>)> {
+    fn search_from(&self, path: &[VertexId], steps: u32) -> Option<(Map<VERTICES>, Vec<usize>)> {
         let mut search = Self(self.0.clone());
         search.0.assume_path(path)?;
-        search.polish(slices);
+        search.refine(steps);
         search.0.refresh();
         Some((search.map(), search.path(path.len())))
     }

@@ -8,7 +8,7 @@ use toposlam::FaultKind;
 
 use super::{BAD, FAINT, GOOD, boxed};
 use crate::monitor::model::Model;
-use toposlam_link::wording::{drive_state, seconds};
+use toposlam_link::event_text::{drive_state, seconds};
 
 pub(super) fn draw(frame: &mut Frame<'_>, area: Rect, model: &Model) {
     let listener = model.watch().listener();

@@ -2,10 +2,10 @@
 //!
 //! ```
 //! use toposlam::wire::Message;
-//! use toposlam_link::wording;
+//! use toposlam_link::event_text;
 //!
 //! let seen = Message::Place { place_index: 3, frame_index: 210, radius_mm: 1172, degree: Some(3) };
-//! assert_eq!(wording::message(&seen), "place 3: radius 1172 mm, 3 ways, in frame 210");
+//! assert_eq!(event_text::message(&seen), "place 3: radius 1172 mm, 3 ways, in frame 210");
 //! ```
 
 use toposlam::FaultKind;
