@@ -199,7 +199,7 @@ fn command_says_why_a_robot_did_not_do_it() {
     let line = format!("tcp:{}", listener.local_addr().unwrap());
     let silent = ["command", "--timeout-ms", "10", "--attempts", "2", &line, "info"];
     let text = complaint(&toposlam(&silent));
-    assert!(text.contains("did not answer 2 requests"), "{text}");
+    assert!(text.contains("no reply to 2 requests"), "{text}");
     let text = complaint(&toposlam(&["command", &line, "set", "no-such-setting", "1"]));
     assert!(text.contains("noise-mm"), "the settings are listed: {text}");
 }

@@ -245,11 +245,11 @@ impl fmt::Display for ClientError {
         match self {
             Self::Line(_) => f.write_str("the line to the robot failed"),
             Self::NoReply { attempts } => {
-                write!(f, "the robot did not answer {attempts} requests: it is not there, or does not know the command")
+                write!(f, "no reply to {attempts} requests: the robot is not connected, or does not know the command")
             }
             Self::Refused(refusal) => write!(f, "the robot refused: {refusal}"),
-            Self::OutOfPlace(outcome) => write!(f, "the robot answered something else: {outcome:?}"),
-            Self::NoMap => f.write_str("the map did not arrive whole"),
+            Self::OutOfPlace(outcome) => write!(f, "unexpected reply: {outcome:?}"),
+            Self::NoMap => f.write_str("the received map is incomplete"),
         }
     }
 }

@@ -64,11 +64,11 @@ enum Action {
         /// Number of the vertex.
         vertex: u8,
     },
-    /// Explore.
+    /// Explore the building.
     Explore,
-    /// Stop the robot and the mapping, or continue.
+    /// Pause the robot and the mapping, or continue.
     Pause {
-        /// on: stop; off: continue.
+        /// on: pause; off: continue.
         state: Switch,
     },
 }
@@ -99,7 +99,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
         }
         Action::Reset => order(&mut client, Command::Reset)?,
         Action::Set { name, value } => {
-            let setting = setting::named(name, *value).context("there is no such setting")?;
+            let setting = setting::named(name, *value).context("unknown setting")?;
             order(&mut client, Command::SetConfig(setting))?;
         }
         Action::LocaliseOnly { state } => {

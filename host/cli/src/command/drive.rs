@@ -17,7 +17,7 @@ use toposlam_sim::world::{GroundTruth, Plan, RobotModel, TrueMap};
 /// The floor plan, the seed and the noise.
 #[derive(Args)]
 pub(super) struct DriveArguments {
-    /// Floor plan: ring, office, flat, or a file (see docs/driving.md).
+    /// Floor plan: ring, office, flat, or a text file (docs/driving.md).
     #[arg(long, default_value = "office")]
     plan: String,
     /// Seed of the drive and of all noise.
@@ -121,7 +121,8 @@ pub(super) fn load_plan(name_or_file: &str) -> anyhow::Result<Plan> {
     if let Some(plan) = Plan::built_in(name_or_file) {
         return Ok(plan);
     }
-    let text = std::fs::read_to_string(name_or_file)
-        .with_context(|| format!("{name_or_file:?} is neither a built-in plan (ring, office, flat) nor a file"))?;
+    let text = std::fs::read_to_string(name_or_file).with_context(|| {
+        format!("{name_or_file:?} is neither a built-in floor plan (ring, office, flat) nor a readable file")
+    })?;
     Plan::parse(&text).with_context(|| format!("floor plan {name_or_file}"))
 }

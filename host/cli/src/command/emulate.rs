@@ -133,15 +133,13 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     )?;
     drop(progress);
     if let Some(message) = elsewhere {
-        bail!("the firmware says {message:?}, and this computer does not");
+        bail!("the firmware sent {message:?}, which differs from the simulation");
     }
 
-    let Ok(Repetition { exploration, .. }) = repetition.into_inner() else {
-        bail!("the repetition on this computer failed")
-    };
+    let Ok(Repetition { exploration, .. }) = repetition.into_inner() else { bail!("the simulation failed") };
     arguments.drive.summarise(&Summary::of(&plan, &exploration))?;
     let counters = heard.decoder.counters();
-    let Some(health) = heard.replica.health() else { bail!("the firmware never said how it is doing") };
+    let Some(health) = heard.replica.health() else { bail!("the firmware sent no Health message") };
     println!("firmware: {} places in {} frames, {:.1} s", heard.places.len(), outcome.frames, outcome.seconds);
     println!("wire: {} messages, {} frames lost, {} corrupt", counters.messages, counters.lost, counters.corrupt);
     println!("sensor bus: {} bytes, {} rounds of the loop", outcome.bus_bytes, health.loop_count);
@@ -149,17 +147,17 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
         println!("stack_high_water_bytes: {bytes}");
     }
     compare(&exploration, &heard)?;
-    println!("the firmware's drive and map are this computer's, bit for bit");
+    println!("drive and map of the firmware and of the simulation are equal bit for bit");
     Ok(())
 }
 
-/// Holds what the firmware said to this computer's repetition. The digest is part of a converged picture.
+/// Compares the messages of the firmware with the simulation.
 fn compare(exploration: &Exploration<'_>, heard: &Heard) -> anyhow::Result<()> {
     let (steps, mapper) = (exploration.steps(), exploration.robot().mapper());
     let map = mapper.map();
     let places = steps.iter().map(|step| (step.update.place_index, step.place.fingerprint.radius_mm()));
-    ensure!(places.eq(heard.places.iter().copied()), "the firmware detected other places than this computer");
-    ensure!(heard.replica.is_converged(), "the map heard over the wire is not complete");
+    ensure!(places.eq(heard.places.iter().copied()), "the firmware detected other places than the simulation");
+    ensure!(heard.replica.is_converged(), "the map received over the wire is incomplete");
     let same_rows = map.vertices().all(|vertex| {
         heard.replica.row(vertex.into()).is_some_and(|row| {
             map.label(vertex).map(|label| label.radius_mm()) == Some(row.radius_mm)
@@ -168,18 +166,15 @@ fn compare(exploration: &Exploration<'_>, heard: &Heard) -> anyhow::Result<()> {
         })
     });
     let same_size = usize::from(heard.replica.vertices()) == map.vertices().len();
-    ensure!(same_rows && same_size, "the firmware's map is another one");
+    ensure!(same_rows && same_size, "the map of the firmware differs");
     if let Some(step) = steps.last() {
         let (filter, place_index) = (mapper.filter(), step.update.place_index);
-        ensure!(
-            heard.replica.location() == Some(Location::from(&step.update)),
-            "the firmware believes to be elsewhere"
-        );
-        ensure!(heard.replica.evidence() == Some(Evidence::from(&step.update)), "the firmware gives other evidence");
+        ensure!(heard.replica.location() == Some(Location::from(&step.update)), "the firmware reports another vertex");
+        ensure!(heard.replica.evidence() == Some(Evidence::from(&step.update)), "the firmware reports other evidence");
         let belief = Some(Belief::of(filter, place_index));
-        ensure!(heard.replica.belief() == belief, "the firmware gives other probabilities");
+        ensure!(heard.replica.belief() == belief, "the firmware reports other probabilities");
         let worst = Some(Worst::of(filter, place_index));
-        ensure!(heard.replica.worst() == worst, "the firmware names another worst n-gram");
+        ensure!(heard.replica.worst() == worst, "the firmware reports another worst n-gram");
     }
     Ok(())
 }

@@ -110,16 +110,17 @@ struct FilterArguments {
     /// Hypotheses (robust) or particles (paper), 1 to 100 [default: 10].
     #[arg(long, alias = "particles", value_name = "N")]
     hypotheses: Option<u8>,
-    /// Robust: initial estimate of the standard deviation of a fingerprint, in millimetres.
+    /// Robust: initial estimate of the standard deviation of a fingerprint, in millimetres
+    /// [default: 30].
     #[arg(long, value_name = "MM")]
     noise_mm: Option<u16>,
-    /// Robust: repair moves tried at each place.
+    /// Robust: repair moves tried at each place [default: 1].
     #[arg(long, value_name = "R")]
     moves: Option<u8>,
-    /// Robust: assumed probability of a wrong turn hint, 0 to 1 in steps of 0.001.
+    /// Robust: assumed probability of a wrong turn hint, 0 to 1 in steps of 0.001 [default: 0.02].
     #[arg(long, value_name = "P", value_parser = permille)]
     wrong_turn: Option<u16>,
-    /// Robust: assumed probability of a wrong degree hint, 0 to 1 in steps of 0.001.
+    /// Robust: assumed probability of a wrong degree hint, 0 to 1 in steps of 0.001 [default: 0.1].
     #[arg(long, value_name = "P", value_parser = permille)]
     wrong_degree: Option<u16>,
     /// Paper: consistency measure, both halves of Eq. 2 or one [default: two-sided].

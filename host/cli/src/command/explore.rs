@@ -33,15 +33,15 @@ pub(crate) struct Arguments {
     #[arg(long, default_value_t = 300)]
     places: usize,
     /// Goals after each exploration that ended with the exact map.
-    #[arg(long, default_value_t = 5)]
-    journeys: u64,
+    #[arg(long, alias = "journeys", default_value_t = 5)]
+    goals: u64,
     /// Bit mask of dead sonars, 0 to 65535; bit 0 is the sonar straight ahead.
     #[arg(long, value_name = "MASK", default_value_t = 0)]
     dead_sonars: u16,
-    /// Probability that an echo is missed, 0 to 1 [default: that of the noise].
+    /// Probability that an echo is missed, 0 to 1 [default: 0.02 times the noise factor].
     #[arg(long, value_name = "P", value_parser = fault_rate)]
     missed: Option<f64>,
-    /// Largest angle of incidence at which a wall returns an echo, in degrees, 0 to 90.
+    /// Largest angle of incidence at which a wall returns an echo, in degrees, 0 to 90 [default: 25].
     #[arg(long, value_name = "DEGREES", value_parser = degrees)]
     specular_limit_deg: Option<f64>,
     /// Fault rate of the ring and the line, 0 to 1: the probability that a sonar echo is lost. Every other rate is proportional to it
@@ -125,7 +125,7 @@ fn one(arguments: &Arguments, plan: &Plan, noise: f64, seed: u64) -> anyhow::Res
         journeys: Journeys::default(),
     };
     if run.exact && run.complete {
-        run.journeys = travel(&mut exploration, arguments.journeys, seed);
+        run.journeys = travel(&mut exploration, arguments.goals, seed);
     }
     Ok(run)
 }

@@ -43,7 +43,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
             ((0..count).map(|number| (format!("robot {number}"), address.clone())).collect(), Some(crowd))
         }
         (file, _) => {
-            let file = file.as_deref().context("no file of lines")?;
+            let file = file.as_deref().context("neither a file of lines nor --simulate was given")?;
             let text = std::fs::read_to_string(file).with_context(|| format!("reading {}", file.display()))?;
             (lines_of(&text)?, None)
         }

@@ -38,7 +38,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
         return screen::run(line, baud, options, |_| ControlFlow::Continue(()));
     }
     let time = arguments.seconds.map(Duration::try_from_secs_f64).transpose()?;
-    ensure!(arguments.events != Some(0), "0 events are none to wait for");
+    ensure!(arguments.events != Some(0), "--events must be at least 1");
     let form = if arguments.json { Form::Json } else { Form::Words };
     headless::run(line, baud, options, form, Limits { events: arguments.events, time }, stdout().lock())
 }

@@ -34,7 +34,7 @@ pub(crate) struct Arguments {
 pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     let mut line = open(&arguments.line, arguments.baud)?;
     let file = &arguments.file;
-    let mut recorder = Recorder::create(file).with_context(|| format!("making {}", file.display()))?;
+    let mut recorder = Recorder::create(file).with_context(|| format!("creating {}", file.display()))?;
     let interrupt = Interrupt::watch()?;
     // The clock of the computer may be set meanwhile; the times of the recording go on evenly.
     let start = Instant::now();

@@ -21,7 +21,7 @@ use super::filter::FilterArgument;
 pub(crate) struct Arguments {
     /// CSV file with a header line and a column of ranges for each sonar.
     recording: PathBuf,
-    /// TOML file that describes the ring, or `scitos-g5` for the built-in one (see docs/evaluation.md).
+    /// TOML file that describes the ring, or `scitos-g5` for the built-in one (docs/replay.md).
     #[arg(long, value_name = "FILE")]
     ring: PathBuf,
     /// Filter that makes the map.

@@ -11,7 +11,7 @@ use super::drive::{fault_rate, load_plan, noise_factor};
 /// Arguments of `toposlam soak`.
 #[derive(Args)]
 pub(crate) struct Arguments {
-    /// Floor plan: ring, office, flat, or a file (see docs/driving.md).
+    /// Floor plan: ring, office, flat, or a text file (docs/driving.md).
     #[arg(long, default_value = "office")]
     plan: String,
     /// Seed of the world, of all noise and of the faults.
@@ -39,6 +39,6 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     }
     let mistakes = life.mistakes();
     ensure!(mistakes.is_empty(), "{}", mistakes.join("; "));
-    println!("nothing was lost, and every fault that can be counted was counted");
+    println!("no place was lost, and every injected fault that can be counted was counted");
     Ok(())
 }

@@ -33,8 +33,8 @@ impl From<McapError> for RecordingError {
 impl fmt::Display for RecordingError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Self::File(_) => f.write_str("the file of the recording failed"),
-            Self::Mcap(_) => f.write_str("the recording is no MCAP file or damaged"),
+            Self::File(_) => f.write_str("cannot access the recording"),
+            Self::Mcap(_) => f.write_str("the recording is not an MCAP file, or is damaged"),
             Self::NoFrames => f.write_str("the MCAP file holds no frames of a toposlam robot"),
         }
     }
