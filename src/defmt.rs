@@ -9,7 +9,7 @@ use crate::ring::Echo;
 use crate::ring::drivers::{AddressError, BridgeError, SonarError, SonarFault};
 use crate::{
     ConfigError, FaultCounters, FaultKind, Fingerprint, FingerprintError, NgramError, NgramsFull, Observation,
-    PaperFactors, RobustFactors, Turn, Update, VerticesFull, WeightFactors, WorstNgram,
+    PaperFactors, RobustFactors, Turn, Update, VertexId, VerticesFull, WeightFactors, WorstNgram,
 };
 
 /// A text for each variant of an enum without fields.
@@ -114,17 +114,23 @@ impl Format for Observation {
     }
 }
 
+impl Format for VertexId {
+    fn format(&self, f: Formatter<'_>) {
+        write!(f, "{=u8}", (*self).into());
+    }
+}
+
 impl Format for WorstNgram {
     fn format(&self, f: Formatter<'_>) {
         let Self { distance_mm, newest_age, .. } = self;
-        write!(f, "{=u16} mm from the walk {=[u8]}, {=u16} places ago", distance_mm, self.walk(), newest_age);
+        write!(f, "{=u16} mm from the walk {}, {=u16} places ago", distance_mm, self.walk(), newest_age);
     }
 }
 
 impl Format for Update {
     fn format(&self, f: Formatter<'_>) {
         let Self { place_index, vertex, is_new, consistency_mm, factors, lead_q16, distinct } = self;
-        write!(f, "place {=u32} is vertex {=u8} (new: {=bool})", place_index, vertex, is_new);
+        write!(f, "place {=u32} is vertex {} (new: {=bool})", place_index, vertex, is_new);
         write!(f, ", consistency {=u16} mm, {}", consistency_mm, factors);
         write!(f, ", lead {=i32} / 65536 nats, {=u8} hypotheses", lead_q16, distinct);
     }

@@ -44,8 +44,8 @@
 //!     }
 //! }
 //! assert_eq!(filter.observed(), 5);
-//! assert_eq!(filter.map().vertices(), 2);
-//! assert!(filter.map().edges().eq([(0, 1)]));
+//! let [a, b] = filter.map().vertices().collect::<Vec<_>>()[..] else { panic!("two vertices") };
+//! assert!(filter.map().edges().eq([(a, b)]));
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 //!
@@ -60,13 +60,13 @@
 //! ```
 //! use toposlam::{Consistency, Direction, Fingerprint, History, Map, NgramLength};
 //!
+//! let [wide, narrow] = [1200, 800].map(|radius_mm| Fingerprint::from_radius_mm(radius_mm).unwrap());
 //! let mut map = Map::<2>::new();
+//! let (a, b) = (map.add_vertex(wide)?, map.add_vertex(narrow)?);
+//! map.add_edge(a, b);
 //! let mut history = History::<1>::new();
-//! for radius_mm in [1200, 800] {
-//!     map.add_vertex(Fingerprint::from_radius_mm(radius_mm)?)?;
-//!     history.push(Fingerprint::from_radius_mm(radius_mm)?);
-//! }
-//! map.add_edge(0, 1);
+//! history.push(wide);
+//! history.push(narrow);
 //! let length = NgramLength::new(5)?;
 //! let mut consistency = Consistency::<2, 1, 1>::new();
 //! assert_eq!(consistency.distance_steps(&map, &history, length, Direction::TwoSided), Some(0));
@@ -160,7 +160,7 @@ pub use filter::{
     NgramTable, NgramsFull, Observation, PaperFactors, PaperFilter, Particle, Prior, RobustConfig, RobustFactors,
     RobustFilter, Turn, Update, WeightFactors, WorstNgram,
 };
-pub use map::{Map, VerticesFull};
+pub use map::{Map, PerVertex, VertexId, VertexSet, VerticesFull};
 pub use mapper::{Mapper, MapperConfig};
 pub use place::{Fingerprint, FingerprintError};
 

@@ -255,7 +255,9 @@ impl<'buffer> Robot<'buffer> {
                 self.localise_only = on;
                 self.filter.set_localise_only(on);
             }
-            Command::GoTo { vertex } if vertex < self.filter.map().vertices() => self.goal = Some(vertex),
+            Command::GoTo { vertex } if usize::from(vertex) < self.filter.map().vertices().len() => {
+                self.goal = Some(vertex)
+            }
             Command::GoTo { .. } => return Err(Refusal::UnknownVertex),
             Command::Explore => self.goal = None,
             Command::Pause { on } => self.paused = on,

@@ -2,7 +2,7 @@
 
 use arbitrary::Arbitrary;
 use toposlam::persist::snapshot::{FILTER_SECTION, Reader, Snapshot, SnapshotError, Writer};
-use toposlam::{Fingerprint, Map, Observation, RobustConfig, RobustFilter, Turn, Update};
+use toposlam::{Fingerprint, Map, Observation, RobustConfig, RobustFilter, Turn, Update, VertexId};
 
 /// The most hypotheses of a [`Small`] filter.
 pub const HYPOTHESES: usize = 4;
@@ -69,10 +69,11 @@ pub fn after(places: usize) -> Box<Small> {
 /// A small filter that knows a map.
 pub fn with_map() -> Box<Small> {
     let mut map = Map::new();
-    for radius_mm in [900, 1300, 1700, 2100, 2500] {
-        map.add_vertex(Fingerprint::from_radius_mm(radius_mm).unwrap()).unwrap();
+    let vertices = [900, 1300, 1700, 2100, 2500]
+        .map(|radius_mm| map.add_vertex(Fingerprint::from_radius_mm(radius_mm).unwrap()).unwrap());
+    for (a, b) in [(0, 1), (1, 2), (2, 3), (3, 4), (4, 0), (0, 2)] {
+        map.add_edge(vertices[a], vertices[b]);
     }
-    [(0, 1), (1, 2), (2, 3), (3, 4), (4, 0), (0, 2)].iter().for_each(|&(a, b)| map.add_edge(a, b));
     let mut filter = Box::new(Small::new());
     filter.start_with_map(CONFIG, 2, &map).unwrap();
     filter
@@ -101,28 +102,27 @@ pub fn moves(filter: &mut Small) -> u8 {
 /// Checks that the map is one, and that the path leads through it.
 pub fn check_map(filter: &Small) {
     let map = filter.map();
-    let vertices = map.vertices();
-    assert!(usize::from(vertices) <= VERTICES);
-    for from in 0..64 {
-        let row = map.neighbours(from);
-        for to in (0..64).filter(|to| row >> to & 1 == 1) {
-            assert!(from < vertices && to < vertices, "an edge from {from} to {to} of {vertices}");
-            assert!(map.neighbours(to) >> from & 1 == 1, "the edge from {from} to {to} does not lead back");
+    let vertices = map.vertices().len();
+    assert!(vertices <= VERTICES);
+    for from in VertexId::first(VertexId::LIMIT) {
+        for to in map.neighbours(from).iter() {
+            assert!(map.contains(from) && map.contains(to), "an edge from {from} to {to} of {vertices}");
+            assert!(map.neighbours(to).contains(from), "the edge from {from} to {to} does not lead back");
         }
-        assert_eq!(map.label(from).is_some(), from < vertices);
+        assert_eq!(map.label(from).is_some(), map.contains(from));
     }
-    assert!(filter.path().all(|vertex| vertex < vertices));
+    assert!(filter.path().all(|vertex| map.contains(vertex)));
 }
 
 /// Checks what holds of every filter behind an update.
 pub fn check(filter: &Small, update: &Update) {
     check_map(filter);
-    let is_vertex = |vertex: u8| vertex < filter.map().vertices();
-    if filter.map().vertices() == 0 {
+    let is_vertex = |vertex: VertexId| filter.map().contains(vertex);
+    if filter.map().vertices().len() == 0 {
         // It only localises, and has no map to do that in.
         return;
     }
-    for vertex in 0..64 {
+    for vertex in VertexId::first(VertexId::LIMIT) {
         assert!(filter.renamed(vertex).is_none_or(is_vertex));
         assert!(filter.place_probability_q16(vertex) <= 65_600);
     }

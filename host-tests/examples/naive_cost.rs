@@ -13,7 +13,7 @@ use std::collections::VecDeque;
 use std::process::exit;
 
 use toposlam::reference::{self, PAPER_HISTORY_WORDS, PAPER_PARTICLES, PaperReference, VERTICES};
-use toposlam::{Config, Direction, Fingerprint, History, Map, Particle};
+use toposlam::{Config, Direction, Fingerprint, History, Map, Particle, VertexId};
 use toposlam_host_tests::graph::Graph;
 use toposlam_host_tests::ngram::{grams_of_graph, grams_of_history};
 
@@ -50,8 +50,8 @@ fn walk_on(walk: &mut Vec<usize>, labels: &[Fingerprint], neighbours: &[Vec<usiz
 }
 
 fn ngrams_of_map(map: &Map<VERTICES>) -> u64 {
-    let row = |vertex| (0..usize::from(map.vertices())).filter(|w| map.neighbours(vertex) >> w & 1 == 1).collect();
-    ngrams(map.labels(), &(0..map.vertices()).map(row).collect::<Vec<_>>())
+    let row = |vertex| map.neighbours(vertex).iter().map(usize::from).collect();
+    ngrams(map.labels(), &map.vertices().map(row).collect::<Vec<_>>())
 }
 
 /// The history is a line along which the robot may have turned back at any place.
@@ -64,17 +64,17 @@ fn ngrams_of_history(history: &VecDeque<Fingerprint>) -> u64 {
 
 /// The maps that the filter predicts from a particle: one for each vertex, and one for a new vertex while there is room.
 fn predictions(particle: &Particle<VERTICES>, observation: Fingerprint) -> impl Iterator<Item = Map<VERTICES>> + '_ {
-    let vertices = particle.map.vertices();
-    let candidates = (vertices + 1).min(VERTICES as u8);
-    (0..candidates).map(move |vertex| {
+    let vertices = particle.map.vertices().len();
+    let candidates = (vertices + 1).min(VERTICES);
+    VertexId::first(candidates).map(move |vertex| {
         let mut map = particle.map;
-        if vertex == vertices {
-            map.add_vertex(observation).expect("there is room");
-        } else {
+        if particle.map.contains(vertex) {
             map.observe(vertex, observation);
+        } else {
+            map.add_vertex(observation).expect("there is room");
         }
         if vertices > 0 {
-            map.add_edge(particle.place, vertex);
+            map.add_edge(particle.at, vertex);
         }
         map
     })

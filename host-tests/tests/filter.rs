@@ -136,7 +136,7 @@ fn a_map_without_room_for_a_new_vertex_is_reported_and_goes_on_with_what_it_has(
             assert_eq!(drive.faults(FaultKind::VerticesFull), place.saturating_sub(VERTICES) as u32);
             drive.observe(1000.0 + 200.0 * place as f64, &mut random);
         }
-        assert!(drive.sizes().iter().all(|&size| usize::from(size) == VERTICES));
+        assert!(drive.sizes().iter().all(|&size| size == VERTICES));
     }
 }
 

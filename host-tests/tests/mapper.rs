@@ -65,7 +65,7 @@ fn a_listener_has_what_the_filter_believes<F: Filter<VERTICES>>(settings: F::Con
         let Some((_, update)) = seen else { continue };
         let filter = mapper.filter();
         assert!(replica.is_converged(), "place {places}");
-        assert!(replica.edges().eq(filter.map().edges()), "place {places}");
+        assert!(replica.edges().eq(filter.map().edges().map(|(a, b)| (a.into(), b.into()))), "place {places}");
         assert_eq!(replica.location(), Some(Location::from(&update)));
         assert_eq!(replica.belief(), Some(Belief::of(filter, places)));
         assert_eq!(replica.worst(), Some(Worst::of(filter, places)));

@@ -1,7 +1,8 @@
 //! What the drive did at each place of the history, and what that tells of the ways of a vertex.
 
 use super::local_planner::Exits;
-use crate::Filter;
+use crate::map::PerVertex;
+use crate::{Filter, VertexId};
 
 /// A place has at most so many ways; the seventh and eighth have no room in the note of a place.
 pub(super) const WAYS: usize = 7;
@@ -21,7 +22,7 @@ pub(super) struct Departures<const HISTORY: usize> {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(super) struct Way {
     /// The vertex it leads to, as far as the best path tells.
-    pub(super) leads_to: Option<u8>,
+    pub(super) leads_to: Option<VertexId>,
     /// How often it was driven, either way.
     pub(super) uses: u16,
 }
@@ -99,15 +100,13 @@ impl<const HISTORY: usize> Departures<HISTORY> {
     /// O(count · HISTORY).
     pub(super) fn ways<const V: usize>(&self, filter: &impl Filter<V>, count: u8) -> [Way; WAYS] {
         let mut ways = [Way::default(); WAYS];
-        let mut way_to = [None::<u8>; V];
+        let mut way_to = PerVertex::<Option<u8>, V>::filled(None);
         let (Some(here), Some(came_from)) = (filter.recent(0), filter.recent(1)) else { return ways };
         // It came by way 0, unless it was carried here or does not know how it left.
         if self.exit(1).is_none() {
             return ways;
         }
-        if let Some(way) = way_to.get_mut(usize::from(came_from)) {
-            *way = Some(0);
-        }
+        way_to[came_from] = Some(0);
         let visits = || {
             let known = (1..HISTORY.saturating_sub(1)).take(self.places as usize);
             known.filter_map(|ago| {
@@ -116,19 +115,16 @@ impl<const HISTORY: usize> Departures<HISTORY> {
                 (filter.recent(ago) == Some(here)).then_some((from, exit.checked_rem(ways)?, filter.recent(ago - 1)?))
             })
         };
-        let number = |way_to: &[Option<u8>; V], vertex: u8| way_to.get(usize::from(vertex)).copied().flatten();
         for _ in 0..count {
             let mut has_changed = false;
             for (from, exit, to) in visits() {
-                let (known, vertex, turned) = match (number(&way_to, from), number(&way_to, to)) {
+                let (known, vertex, turned) = match (way_to[from], way_to[to]) {
                     (Some(way), None) => (way, to, exit),
                     (None, Some(way)) => (way, from, count - exit),
                     _ => continue,
                 };
-                if let (Some(slot), Some(way)) =
-                    (way_to.get_mut(usize::from(vertex)), known.saturating_add(turned).checked_rem(count))
-                {
-                    *slot = Some(way);
+                if let Some(way) = known.saturating_add(turned).checked_rem(count) {
+                    way_to[vertex] = Some(way);
                     has_changed = true;
                 }
             }
@@ -136,7 +132,7 @@ impl<const HISTORY: usize> Departures<HISTORY> {
                 break;
             }
         }
-        let mut used = |way: Option<u8>, vertex: u8| {
+        let mut used = |way: Option<u8>, vertex: VertexId| {
             if let Some(way) = way.and_then(|way| ways.get_mut(usize::from(way))) {
                 way.leads_to = Some(vertex);
                 way.uses = way.uses.saturating_add(1);
@@ -144,8 +140,8 @@ impl<const HISTORY: usize> Departures<HISTORY> {
         };
         used(Some(0), came_from);
         for (from, _, to) in visits() {
-            used(number(&way_to, from), from);
-            used(number(&way_to, to), to);
+            used(way_to[from], from);
+            used(way_to[to], to);
         }
         ways
     }

@@ -38,7 +38,7 @@ pub use wheels::{DifferentialDrive, MotorError, Wheel, WheelSpeeds, WheelsConfig
 pub(crate) use departures::is_departure;
 
 use crate::place::{Place, PlaceDetector};
-use crate::{ConfigError, FaultCounters, Filter, Turn, Update};
+use crate::{ConfigError, FaultCounters, Filter, Turn, Update, VertexId};
 use local_planner::LocalPlanner;
 use route_planner::RoutePlanner;
 
@@ -126,7 +126,7 @@ impl<const V: usize, const HISTORY: usize> Drive<V, HISTORY> {
     }
 
     /// Whether the best map has a path from the robot's vertex to another one. Time O(V²).
-    pub fn leads_to(&self, filter: &impl Filter<V>, vertex: u8) -> bool {
+    pub fn leads_to(&self, filter: &impl Filter<V>, vertex: VertexId) -> bool {
         route_planner::leads_to(filter, vertex)
     }
 

@@ -5,7 +5,8 @@ use rand_core::Rng;
 use super::departures::{Departures, WAYS, Way};
 use super::local_planner::Exits;
 use crate::filter::draws;
-use crate::{Filter, Update};
+use crate::map::PerVertex;
+use crate::{Filter, Update, VertexId, VertexSet};
 
 /// A robot is at a vertex when the filter believes so with at least this probability, in units of 2⁻¹⁶.
 const CONFIRMED_Q16: u32 = 1 << 15;
@@ -17,7 +18,7 @@ pub enum Goal {
     /// Leave every place by the way that was used least.
     Explore,
     /// Drive to this vertex of the best map and stand there.
-    Vertex(u8),
+    Vertex(VertexId),
     /// Stand at the next place.
     Stop,
 }
@@ -137,14 +138,14 @@ impl<const V: usize, const HISTORY: usize> RoutePlanner<V, HISTORY> {
     }
 
     /// Whether the goal_status is over.
-    fn look_around(&mut self, filter: &impl Filter<V>, target: u8) {
+    fn look_around(&mut self, filter: &impl Filter<V>, target: VertexId) {
         if self.goal_status != GoalStatus::Active {
             return;
         }
         let is_there = filter.recent(0) == Some(target) && filter.place_probability_q16(target) >= CONFIRMED_Q16;
         if is_there {
             self.goal_status = GoalStatus::Reached;
-        } else if target >= filter.map().vertices() {
+        } else if !filter.map().contains(target) {
             self.goal_status = GoalStatus::VertexRemoved;
         } else if usize::from(self.places) > 8 * V {
             self.goal_status = GoalStatus::TimedOut;
@@ -159,9 +160,9 @@ impl<const V: usize, const HISTORY: usize> RoutePlanner<V, HISTORY> {
 
     /// The way to the neighbour that is nearest to the target; if it is not known which way leads there, one of which it is not
     /// known where it leads.
-    fn towards(&self, filter: &impl Filter<V>, target: u8, known: &[Way; WAYS], count: u8) -> Option<u8> {
+    fn towards(&self, filter: &impl Filter<V>, target: VertexId, known: &[Way; WAYS], count: u8) -> Option<u8> {
         let steps_to = steps_to(filter, target);
-        let steps = |vertex: u8| steps_to.get(usize::from(vertex)).copied().flatten();
+        let steps = |vertex: VertexId| steps_to[vertex];
         let way_steps = |way: &Way| way.leads_to.and_then(steps);
         let nearest = known.iter().take(usize::from(count)).filter_map(way_steps).min();
         let here = filter.recent(0).and_then(steps);
@@ -184,27 +185,24 @@ impl<const V: usize, const HISTORY: usize> RoutePlanner<V, HISTORY> {
 }
 
 /// Whether the best map has a way from where the robot is to a vertex.
-pub(super) fn leads_to<const V: usize>(filter: &impl Filter<V>, vertex: u8) -> bool {
-    let here = filter.recent(0).map(usize::from);
-    here.is_some_and(|here| steps_to(filter, vertex).get(here).copied().flatten().is_some())
+pub(super) fn leads_to<const V: usize>(filter: &impl Filter<V>, vertex: VertexId) -> bool {
+    filter.recent(0).is_some_and(|here| steps_to(filter, vertex)[here].is_some())
 }
 
-/// How many edges each vertex of the best map is away from another. Time O(V²) on rows of bits.
-fn steps_to<const V: usize>(filter: &impl Filter<V>, target: u8) -> [Option<u8>; V] {
+/// How many edges each vertex of the best map is away from another. Time O(V²).
+fn steps_to<const V: usize>(filter: &impl Filter<V>, target: VertexId) -> PerVertex<Option<u8>, V> {
     let map = filter.map();
-    let mut steps_to = [None; V];
-    let mut reached: u64 = 0;
-    let mut newly: u64 = 1u64.checked_shl(u32::from(target)).unwrap_or(0);
+    let mut steps_to = PerVertex::filled(None);
+    let mut reached = VertexSet::EMPTY;
+    let mut newly = VertexSet::from(target);
     for steps in 0..V as u8 {
-        let mut next = 0;
-        for (vertex, slot) in (0..map.vertices()).zip(&mut steps_to) {
-            if newly >> (vertex & 63) & 1 == 1 {
-                *slot = Some(steps);
-                next |= map.neighbours(vertex);
-            }
+        let mut next = VertexSet::EMPTY;
+        for vertex in map.vertices().filter(|&vertex| newly.contains(vertex)) {
+            steps_to[vertex] = Some(steps);
+            next |= map.neighbours(vertex);
         }
         reached |= newly;
-        newly = next & !reached;
+        newly = next - reached;
     }
     steps_to
 }

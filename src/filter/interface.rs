@@ -2,7 +2,7 @@
 
 use super::robust::NGRAM_LENGTH;
 use super::{PaperFilter, RobustConfig, RobustFilter, Update, WorstNgram};
-use crate::{Config, ConfigError, FaultCounters, Map, Observation};
+use crate::{Config, ConfigError, FaultCounters, Map, Observation, VertexId};
 
 /// What a filter with some settings has room for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -55,17 +55,17 @@ pub trait Filter<const V: usize>: Sized {
 
     /// The vertex of a place by the best path, so many places ago, 0 for the newest; `None` when the filter does not
     /// remember that.
-    fn recent(&self, ago: usize) -> Option<u8>;
+    fn recent(&self, ago: usize) -> Option<VertexId>;
 
     /// The probability that the robot is at a vertex of the best map.
-    fn place_probability_q16(&self, vertex: u8) -> u32;
+    fn place_probability_q16(&self, vertex: VertexId) -> u32;
 
     /// The probability that the best map is right, relative to its rivals.
     fn map_probability_q16(&self) -> u32;
 
     /// For each vertex before the last update its number now; `None` when it is gone. A vertex that was merged into
     /// another has the number of the other.
-    fn renamed(&self, before: u8) -> Option<u8>;
+    fn renamed(&self, before: VertexId) -> Option<VertexId>;
 
     /// The n-gram of the history that the best map explains worst.
     fn worst(&self) -> WorstNgram;
@@ -113,11 +113,11 @@ impl<const N: usize, const V: usize, const HISTORY: usize> Filter<V> for RobustF
         self.faults()
     }
 
-    fn recent(&self, ago: usize) -> Option<u8> {
+    fn recent(&self, ago: usize) -> Option<VertexId> {
         self.recent(ago)
     }
 
-    fn place_probability_q16(&self, vertex: u8) -> u32 {
+    fn place_probability_q16(&self, vertex: VertexId) -> u32 {
         self.place_probability_q16(vertex)
     }
 
@@ -125,7 +125,7 @@ impl<const N: usize, const V: usize, const HISTORY: usize> Filter<V> for RobustF
         self.map_probability_q16()
     }
 
-    fn renamed(&self, before: u8) -> Option<u8> {
+    fn renamed(&self, before: VertexId) -> Option<VertexId> {
         self.renamed(before)
     }
 
@@ -175,12 +175,12 @@ impl<const N: usize, const V: usize, const WORDS: usize> Filter<V> for PaperFilt
         self.faults()
     }
 
-    fn recent(&self, ago: usize) -> Option<u8> {
-        (self.observed() > 0 && ago == 0).then(|| self.best().place)
+    fn recent(&self, ago: usize) -> Option<VertexId> {
+        (self.observed() > 0 && ago == 0).then(|| self.best().at)
     }
 
-    fn place_probability_q16(&self, vertex: u8) -> u32 {
-        if self.observed() > 0 && vertex == self.best().place { 1 << 16 } else { 0 }
+    fn place_probability_q16(&self, vertex: VertexId) -> u32 {
+        if self.observed() > 0 && vertex == self.best().at { 1 << 16 } else { 0 }
     }
 
     fn map_probability_q16(&self) -> u32 {
@@ -189,8 +189,8 @@ impl<const N: usize, const V: usize, const WORDS: usize> Filter<V> for PaperFilt
         ((u32::from(self.best().multiplicity) << 16) / draws.max(1)).min(1 << 16)
     }
 
-    fn renamed(&self, before: u8) -> Option<u8> {
-        (before < self.map().vertices()).then_some(before)
+    fn renamed(&self, before: VertexId) -> Option<VertexId> {
+        self.map().contains(before).then_some(before)
     }
 
     fn worst(&self) -> WorstNgram {
@@ -218,12 +218,12 @@ mod tests {
     #[test]
     fn the_paper_s_filter_is_certain_of_its_place_and_trusts_its_map_by_its_draws() {
         let filter: Paper = after(Config::DEFAULT, &[]);
-        assert_eq!((filter.place_probability_q16(0), Filter::map_probability_q16(&filter)), (0, 0));
+        assert_eq!((filter.place_probability_q16(VertexId::FIRST), Filter::map_probability_q16(&filter)), (0, 0));
         let filter: Paper = after(Config::DEFAULT, &[1200, 2200, 1200, 2200]);
-        let place = filter.best().place;
-        for vertex in 0..4 {
-            assert_eq!(filter.place_probability_q16(vertex), if vertex == place { 1 << 16 } else { 0 });
-            let has_it = vertex < filter.best().map.vertices();
+        let at = filter.best().at;
+        for vertex in VertexId::first(4) {
+            assert_eq!(filter.place_probability_q16(vertex), if vertex == at { 1 << 16 } else { 0 });
+            let has_it = filter.best().map.contains(vertex);
             assert_eq!(Filter::renamed(&filter, vertex), has_it.then_some(vertex));
         }
         let share = (u32::from(filter.best().multiplicity) << 16) / 10;

@@ -13,6 +13,7 @@ pub use paper::{
 };
 pub use robust::{RobustConfig, RobustFilter};
 
+use crate::VertexId;
 use rand_core::SeedableRng;
 use rand_xoshiro::Xoshiro128PlusPlus;
 
@@ -28,7 +29,7 @@ pub struct Update {
     /// How many places were observed before this one.
     pub place_index: u32,
     /// The vertex the robot is at (Section III.B).
-    pub vertex: u8,
+    pub vertex: VertexId,
     /// Whether the vertex was added by this observation.
     pub is_new: bool,
     /// The distance of Eq. 2, or of the half of it that is configured, in millimetres; `u16::MAX` when it is infinite.
@@ -47,7 +48,7 @@ impl Update {
     /// What a filter tells that was never started.
     pub(crate) const NONE: Self = Self {
         place_index: 0,
-        vertex: 0,
+        vertex: VertexId::FIRST,
         is_new: false,
         consistency_mm: 0,
         factors: WeightFactors::Robust(RobustFactors::ONE),
@@ -125,15 +126,15 @@ pub struct WorstNgram {
     /// How many places ago the newest of its labels was observed; 0 for the newest place.
     pub newest_age: u16,
     /// The vertices of the nearest walk, the oldest first, `length` of them.
-    pub vertices: [u8; 7],
+    pub vertices: [VertexId; 7],
 }
 
 impl WorstNgram {
     /// No n-gram.
-    pub const NONE: Self = Self { distance_mm: 0, length: 0, newest_age: 0, vertices: [0; 7] };
+    pub const NONE: Self = Self { distance_mm: 0, length: 0, newest_age: 0, vertices: [VertexId::FIRST; 7] };
 
     /// The vertices of the nearest walk, the oldest first.
-    pub fn walk(&self) -> &[u8] {
+    pub fn walk(&self) -> &[VertexId] {
         self.vertices.get(..usize::from(self.length)).unwrap_or(&self.vertices)
     }
 }

@@ -1,5 +1,15 @@
 //! The topological map: a labelled graph of places and the connections between them (Section II of the paper).
 
+mod per_vertex;
+mod vertex;
+mod vertex_set;
+
+pub use per_vertex::PerVertex;
+pub use vertex::VertexId;
+pub use vertex_set::VertexSet;
+#[allow(unused_imports)]
+pub(crate) use vertex_set::VertexSet32;
+
 use crate::Fingerprint;
 
 /// The label of a vertex: the running mean of the fingerprints observed there, kept as sum and count so that it never
@@ -39,8 +49,8 @@ impl Label {
 
 /// A labelled graph of at most `V` vertices (`V` ≤ 64), numbered from 0 in the order in which they were added.
 ///
-/// Adjacency is one bit row a vertex: bit `w` of row `v` says that an edge joins `v` and `w`. An edge from a vertex to
-/// itself is a corridor that leads back to the place it left. Memory: 18 bytes a vertex.
+/// Adjacency is one [`VertexSet`] a vertex. An edge from a vertex to itself is a corridor that leads back to the place it
+/// left. Memory: 18 bytes a vertex.
 ///
 /// ```
 /// use toposlam::{Fingerprint, Map};
@@ -57,117 +67,114 @@ impl Label {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Map<const V: usize> {
     vertices: u8,
-    labels: [Label; V],
+    labels: PerVertex<Label, V>,
     /// The rounded means of `labels`, which the inner loops read far more often than they change.
-    means: [Fingerprint; V],
-    adjacency: [u64; V],
+    means: PerVertex<Fingerprint, V>,
+    adjacency: PerVertex<VertexSet, V>,
 }
 
 impl<const V: usize> Map<V> {
     /// The map without any vertex.
     pub const fn new() -> Self {
-        const { assert!(V >= 1 && V <= 64, "a map holds 1 to 64 vertices: an adjacency row is one u64") };
-        Self { vertices: 0, labels: [Label::NONE; V], means: [Fingerprint::ZERO; V], adjacency: [0; V] }
+        Self {
+            vertices: 0,
+            labels: PerVertex::new([Label::NONE; V]),
+            means: PerVertex::new([Fingerprint::ZERO; V]),
+            adjacency: PerVertex::new([VertexSet::EMPTY; V]),
+        }
     }
 
-    /// How many vertices the map has.
-    pub const fn vertices(&self) -> u8 {
-        self.vertices
+    /// All vertices in the order of their numbers; `map.vertices().len()` is how many there are.
+    pub fn vertices(&self) -> impl ExactSizeIterator<Item = VertexId> + DoubleEndedIterator + Clone + use<V> {
+        VertexId::first(self.vertices.into())
+    }
+
+    /// Whether the map has a vertex.
+    pub fn contains(&self, vertex: VertexId) -> bool {
+        vertex.index() < usize::from(self.vertices)
     }
 
     /// The label of a vertex, the rounded mean of its fingerprints; `None` for a vertex the map does not have.
-    pub fn label(&self, vertex: u8) -> Option<Fingerprint> {
-        self.labels().get(usize::from(vertex)).copied()
+    pub fn label(&self, vertex: VertexId) -> Option<Fingerprint> {
+        self.contains(vertex).then(|| self.means[vertex])
     }
 
     /// The label of a vertex that the map has.
-    pub(crate) fn label_of(&self, vertex: u8) -> Fingerprint {
-        self.means.get(usize::from(vertex)).copied().unwrap_or(Fingerprint::ZERO)
+    pub(crate) fn label_of(&self, vertex: VertexId) -> Fingerprint {
+        self.means[vertex]
     }
 
     /// The labels of all vertices in the order of their numbers.
     pub fn labels(&self) -> &[Fingerprint] {
-        self.means.get(..usize::from(self.vertices)).unwrap_or(&[])
+        self.means.values().get(..usize::from(self.vertices)).unwrap_or(&[])
     }
 
     /// How many observations the label of a vertex is the mean of; 0 for a vertex the map does not have.
-    pub fn visits(&self, vertex: u8) -> u32 {
-        self.labels.get(usize::from(vertex)).map_or(0, |label| label.visits)
+    pub fn visits(&self, vertex: VertexId) -> u32 {
+        if self.contains(vertex) { self.labels[vertex].visits } else { 0 }
     }
 
-    /// The neighbours of a vertex as a bit row; 0 for a vertex the map does not have.
-    pub fn neighbours(&self, vertex: u8) -> u64 {
-        self.adjacency.get(usize::from(vertex)).copied().unwrap_or(0)
+    /// The neighbours of a vertex; none for a vertex the map does not have.
+    pub fn neighbours(&self, vertex: VertexId) -> VertexSet {
+        self.adjacency.get(vertex).copied().unwrap_or(VertexSet::EMPTY)
     }
 
     /// Every edge once, as pairs of vertices with the smaller number first.
-    pub fn edges(&self) -> impl Iterator<Item = (u8, u8)> + '_ {
-        (0..self.vertices).flat_map(move |a| bits(self.neighbours(a)).filter(move |&b| a <= b).map(move |b| (a, b)))
+    pub fn edges(&self) -> impl Iterator<Item = (VertexId, VertexId)> + '_ {
+        self.vertices().flat_map(move |a| self.neighbours(a).iter().filter(move |&b| a <= b).map(move |b| (a, b)))
     }
 
-    /// Adds a vertex whose label is one fingerprint, and returns its number.
+    /// Adds a vertex whose label is one fingerprint.
     ///
     /// # Errors
     /// [`VerticesFull`] when the map has `V` vertices; it stays as it is.
-    pub fn add_vertex(&mut self, fingerprint: Fingerprint) -> Result<u8, VerticesFull> {
-        let vertex = self.vertices;
-        let slot = usize::from(vertex);
-        let (Some(label), Some(mean)) = (self.labels.get_mut(slot), self.means.get_mut(slot)) else {
-            return Err(VerticesFull);
-        };
-        *label = Label::NONE;
-        label.include(fingerprint);
-        *mean = fingerprint;
+    pub fn add_vertex(&mut self, fingerprint: Fingerprint) -> Result<VertexId, VerticesFull> {
+        let vertex = self.next_vertex().ok_or(VerticesFull)?;
+        self.labels[vertex] = Label::NONE.including(fingerprint);
+        self.means[vertex] = fingerprint;
         self.vertices += 1;
         Ok(vertex)
     }
 
-    /// Adds a vertex with a label that so many fingerprints were seen for; the label stays when the number is 0.
-    pub(crate) fn add_known_vertex(&mut self, fingerprint: Fingerprint, visits: u32) -> Result<u8, VerticesFull> {
+    /// The vertex that would be added next; `None` when the map is full.
+    pub(crate) fn next_vertex(&self) -> Option<VertexId> {
+        VertexId::new(self.vertices).filter(|vertex| vertex.index() < V)
+    }
+
+    /// Adds a vertex with a label that is the mean of `visits` fingerprints, 1 at least.
+    pub(crate) fn add_known_vertex(&mut self, fingerprint: Fingerprint, visits: u32) -> Result<VertexId, VerticesFull> {
         let vertex = self.add_vertex(fingerprint)?;
-        if let Some(label) = self.labels.get_mut(usize::from(vertex)) {
-            let visits = visits.clamp(1, Label::FULL);
-            *label = Label { sum_steps: u32::from(fingerprint.steps()) * visits, visits };
-        }
+        let visits = visits.clamp(1, Label::FULL);
+        self.labels[vertex] = Label { sum_steps: u32::from(fingerprint.steps()) * visits, visits };
         Ok(vertex)
     }
 
     /// Takes one more fingerprint into the label of a vertex; nothing happens for a vertex the map does not have.
-    pub fn observe(&mut self, vertex: u8, fingerprint: Fingerprint) {
-        let slot = usize::from(vertex);
-        if vertex >= self.vertices {
-            return;
-        }
-        if let (Some(label), Some(mean)) = (self.labels.get_mut(slot), self.means.get_mut(slot)) {
+    pub fn observe(&mut self, vertex: VertexId, fingerprint: Fingerprint) {
+        if self.contains(vertex) {
+            let label = &mut self.labels[vertex];
             label.include(fingerprint);
-            *mean = label.mean();
+            self.means[vertex] = label.mean();
         }
     }
 
     /// What the label of a vertex would be with one more fingerprint; that of a new vertex is the fingerprint.
-    pub(crate) fn label_with(&self, vertex: u8, fingerprint: Fingerprint) -> Fingerprint {
-        if vertex >= self.vertices {
-            return fingerprint;
-        }
-        self.labels.get(usize::from(vertex)).map_or(fingerprint, |label| label.including(fingerprint).mean())
+    pub(crate) fn label_with(&self, vertex: VertexId, fingerprint: Fingerprint) -> Fingerprint {
+        if self.contains(vertex) { self.labels[vertex].including(fingerprint).mean() } else { fingerprint }
     }
 
     /// Joins two vertices by an edge; nothing happens when there is one or when the map lacks one of them.
-    pub fn add_edge(&mut self, a: u8, b: u8) {
-        if a >= self.vertices || b >= self.vertices {
-            return;
-        }
-        for (from, to) in [(a, b), (b, a)] {
-            if let Some(row) = self.adjacency.get_mut(usize::from(from)) {
-                *row |= 1 << (to & 63);
-            }
+    pub fn add_edge(&mut self, a: VertexId, b: VertexId) {
+        if self.contains(a) && self.contains(b) {
+            self.adjacency[a].insert(b);
+            self.adjacency[b].insert(a);
         }
     }
 
-    /// Forgets all vertices and edges.
+    /// Removes all vertices and edges.
     pub fn clear(&mut self) {
         self.vertices = 0;
-        self.adjacency = [0; V];
+        self.adjacency = PerVertex::filled(VertexSet::EMPTY);
     }
 }
 
@@ -225,17 +232,16 @@ mod tests {
         let mut map = Map::<1>::new();
         map.add_vertex(Fingerprint::MAX).unwrap();
         for _ in 0..3_000_000 {
-            map.observe(0, Fingerprint::MAX);
+            map.observe(VertexId::FIRST, Fingerprint::MAX);
         }
-        assert_eq!(map.label(0), Some(Fingerprint::MAX));
+        assert_eq!(map.label(VertexId::FIRST), Some(Fingerprint::MAX));
     }
 
     #[test]
     fn a_full_map_refuses_a_vertex_and_stays_as_it_is() {
         let mut map = Map::<2>::new();
-        map.add_vertex(fingerprint(1)).unwrap();
-        map.add_vertex(fingerprint(2)).unwrap();
-        map.add_edge(0, 1);
+        let [a, b] = [1, 2].map(|steps| map.add_vertex(fingerprint(steps)).unwrap());
+        map.add_edge(a, b);
         let before = map;
         assert_eq!(map.add_vertex(fingerprint(3)), Err(VerticesFull));
         assert_eq!(map, before);
@@ -244,13 +250,12 @@ mod tests {
     #[test]
     fn edges_are_listed_once_and_loops_too() {
         let mut map = Map::<4>::new();
-        for steps in 0..4 {
-            map.add_vertex(fingerprint(steps)).unwrap();
+        let [a, b, c, d] = [0, 1, 2, 3].map(|steps| map.add_vertex(fingerprint(steps)).unwrap());
+        let missing = VertexId::new(9).unwrap();
+        for (from, to) in [(c, b), (b, c), (d, d), (a, d), (a, missing)] {
+            map.add_edge(from, to);
         }
-        for (a, b) in [(2, 1), (1, 2), (3, 3), (0, 3), (0, 9)] {
-            map.add_edge(a, b);
-        }
-        assert_eq!(map.edges().collect::<Vec<_>>(), [(0, 3), (1, 2), (3, 3)]);
-        assert_eq!(map.neighbours(1), 0b100);
+        assert_eq!(map.edges().collect::<Vec<_>>(), [(a, d), (b, c), (d, d)]);
+        assert_eq!(map.neighbours(b), VertexSet::from(c));
     }
 }

@@ -4,7 +4,7 @@ use super::{Board, FRAMES_PER_HELLO, Line, RECEIVED_PER_TURN, Robot, restore, sn
 use crate::drive::{self, Goal};
 use crate::persist::snapshot::Resume;
 use crate::wire::{Command, GoalState, GoalStatus, Info, Message, Outcome, Refusal, Setting, Settings, Version};
-use crate::{FaultKind, RobustFilter};
+use crate::{FaultKind, RobustFilter, VertexId};
 
 /// No way to a vertex was told of.
 pub(super) const NOTHING: (Goal, drive::GoalStatus) = (Goal::Explore, drive::GoalStatus::Inactive);
@@ -56,7 +56,7 @@ impl<const SONARS: usize, const N: usize, const V: usize, const HISTORY: usize> 
 
     fn info(&self, board: &mut impl Board) -> Info {
         let goal = match (self.drive.goal(), self.drive.goal_status()) {
-            (Goal::Vertex(vertex), drive::GoalStatus::Active) => Some(vertex),
+            (Goal::Vertex(vertex), drive::GoalStatus::Active) => Some(vertex.into()),
             _ => None,
         };
         Info {
@@ -117,9 +117,8 @@ impl<const SONARS: usize, const N: usize, const V: usize, const HISTORY: usize> 
     }
 
     fn go_to(&mut self, vertex: u8, board: &mut impl Board) -> Result<(), Refusal> {
-        if vertex >= self.mapper.map().vertices() {
-            return Err(Refusal::UnknownVertex);
-        }
+        let known = VertexId::new(vertex).filter(|&vertex| self.mapper.map().contains(vertex));
+        let vertex = known.ok_or(Refusal::UnknownVertex)?;
         if !self.drive.leads_to(self.mapper.filter(), vertex) {
             return Err(Refusal::NoRoute);
         }
@@ -129,7 +128,8 @@ impl<const SONARS: usize, const N: usize, const V: usize, const HISTORY: usize> 
 
     fn set_goal(&mut self, goal: Goal, board: &mut impl Board) {
         if let (Goal::Vertex(vertex), drive::GoalStatus::Active) = self.told {
-            let _ = self.send(&Message::GoalStatus(GoalStatus { vertex, state: GoalState::Replaced }), board);
+            let _ = self
+                .send(&Message::GoalStatus(GoalStatus { vertex: vertex.into(), state: GoalState::Replaced }), board);
         }
         self.told = NOTHING;
         self.drive.set_goal(goal);
@@ -146,7 +146,8 @@ impl<const SONARS: usize, const N: usize, const V: usize, const HISTORY: usize> 
             drive::GoalStatus::VertexRemoved => GoalState::VertexRemoved,
             drive::GoalStatus::TimedOut => GoalState::TimedOut,
         };
-        if self.told != now && self.send(&Message::GoalStatus(GoalStatus { vertex, state }), board).is_ok() {
+        let message = Message::GoalStatus(GoalStatus { vertex: vertex.into(), state });
+        if self.told != now && self.send(&message, board).is_ok() {
             self.told = now;
         }
     }

@@ -43,7 +43,7 @@
 //! robot.start(&ROBOT, &mut buffer)?;
 //! let frame = RingFrame { echoes: [Echo::Silence; SONARS] };
 //! robot.turn(&frame, &FaultCounters::new(), &mut Bare);
-//! assert_eq!(robot.mapper().map().vertices(), 0);
+//! assert_eq!(robot.mapper().map().vertices().len(), 0);
 //! # Ok::<(), toposlam::ConfigError>(())
 //! ```
 

@@ -1,8 +1,8 @@
 //! CRC-32 of a frame and of a whole map.
 
 use super::Row;
-use crate::Map;
 use crate::checksum::CRC;
+use crate::{Map, VertexId};
 
 /// CRC-32 ISO-HDLC of some bytes.
 pub fn crc32(bytes: &[u8]) -> u32 {
@@ -15,7 +15,7 @@ pub fn crc32(bytes: &[u8]) -> u32 {
 /// (`u16`), the number of visits (`u32`) and the neighbours (`u64`, bit `w` for vertex `w`), all little endian. Two
 /// different maps have the same digest once in 2³² times. Cost: 14 bytes a vertex.
 pub fn map_digest<const V: usize>(map: &Map<V>) -> u32 {
-    rows_digest(map.vertices(), (0..map.vertices()).map(|vertex| row_of(map, vertex)))
+    rows_digest(map.vertices().len() as u8, map.vertices().map(|vertex| row_of(map, vertex)))
 }
 
 /// The digest of a map that is given as its rows.
@@ -31,12 +31,12 @@ pub(super) fn rows_digest(vertices: u8, rows: impl Iterator<Item = Row>) -> u32 
 }
 
 /// All that a map says about one vertex.
-pub(super) fn row_of<const V: usize>(map: &Map<V>, vertex: u8) -> Row {
+pub(super) fn row_of<const V: usize>(map: &Map<V>, vertex: VertexId) -> Row {
     Row {
-        vertex,
+        vertex: vertex.into(),
         radius_mm: map.label(vertex).map_or(0, |label| label.radius_mm()),
         visits: map.visits(vertex),
-        neighbours: map.neighbours(vertex),
+        neighbours: map.neighbours(vertex).bits(),
     }
 }
 
@@ -54,9 +54,8 @@ mod tests {
     fn the_digest_is_the_crc_of_the_canonical_bytes() {
         let mut map = Map::<4>::new();
         assert_eq!(map_digest(&map), CRC.checksum(&[0]));
-        map.add_vertex(Fingerprint::from_radius_mm(0x0204).unwrap()).unwrap();
-        map.add_vertex(Fingerprint::from_radius_mm(1000).unwrap()).unwrap();
-        map.add_edge(0, 1);
+        let [a, b] = [0x0204, 1000].map(|mm| map.add_vertex(Fingerprint::from_radius_mm(mm).unwrap()).unwrap());
+        map.add_edge(a, b);
         let bytes = [2, 4, 2, 1, 0, 0, 0, 2, 0, 0, 0, 0, 0, 0, 0, 232, 3, 1, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0];
         assert_eq!(map_digest(&map), CRC.checksum(&bytes));
     }

@@ -179,15 +179,15 @@ impl Drive {
     }
 
     /// The numbers of vertices of the core's maps.
-    pub fn sizes(&self) -> Vec<u8> {
-        self.core.particles().iter().map(|particle| particle.map.vertices()).collect()
+    pub fn sizes(&self) -> Vec<usize> {
+        self.core.particles().iter().map(|particle| particle.map.vertices().len()).collect()
     }
 
     /// The candidates that the core drew, in the order of the pool.
     fn chosen_by_the_core(&self, pool: &[Candidate]) -> Vec<usize> {
         let candidate_of = |particle: &CoreParticle<VERTICES>| {
             let is_it = |candidate: &Candidate| {
-                (candidate.parent, candidate.vertex) == (usize::from(particle.parent), usize::from(particle.place))
+                (candidate.parent, candidate.vertex) == (usize::from(particle.parent), usize::from(particle.at))
             };
             pool.iter().position(is_it).expect("the core draws from the same pool")
         };
@@ -274,7 +274,7 @@ impl Drive {
         let heaviest = of_chosen[of_chosen.len() - 1];
         let difference = nats(best.factors.ln_weight_q16()) - heaviest.ln_weight();
         assert!(difference.abs() <= self.tolerance_of_weight(heaviest), "{update:?} {difference}");
-        assert_eq!((update.vertex, update.factors), (best.place, WeightFactors::Paper(best.factors)));
+        assert_eq!((update.vertex, update.factors), (best.at, WeightFactors::Paper(best.factors)));
         // The lead that is told is a bound on the true one, at which the rivals are as near to the evidence as any.
         let proposals = filter::proposals(pool, LEAST_PROPOSAL * 1.1);
         let rivals = || {
@@ -289,17 +289,17 @@ impl Drive {
         let heaviest_rival = rivals().map(Candidate::ln_weight).fold(f64::NEG_INFINITY, f64::max);
         let lead = (heaviest.ln_weight() - heaviest_rival).min(15.0);
         assert!(nats(update.lead_q16) <= lead + tolerance, "{update:?} {lead} {:?}", self.config);
-        assert_eq!(update.is_new, best.map.visits(best.place) == 1);
+        assert_eq!(update.is_new, best.map.visits(best.at) == 1);
     }
 
     fn check_particles(&self, pool: &[Candidate]) {
         assert_eq!(self.core.particles().len(), self.particles.len());
         for (core, particle) in self.core.particles().iter().zip(&self.particles) {
             assert_eq!(usize::from(core.multiplicity), particle.multiplicity);
-            assert_eq!(Some(usize::from(core.place)), particle.place);
+            assert_eq!(Some(usize::from(core.at)), particle.place);
             assert_eq!(map_of(core), map_parts(&particle.map));
             let is_it = |candidate: &&Candidate| {
-                (candidate.parent, candidate.vertex) == (particle.parent, usize::from(core.place))
+                (candidate.parent, candidate.vertex) == (particle.parent, usize::from(core.at))
             };
             self.check_factors(core, pool.iter().find(is_it).expect("it was drawn from the pool"));
         }
@@ -337,7 +337,7 @@ type MapParts = (Vec<f64>, Vec<usize>, Vec<(usize, usize)>);
 fn map_of(particle: &CoreParticle<VERTICES>) -> MapParts {
     let map = &particle.map;
     let labels = map.labels().iter().map(|label| f64::from(label.radius_mm())).collect();
-    let visits = (0..map.vertices()).map(|vertex| map.visits(vertex) as usize).collect();
+    let visits = map.vertices().map(|vertex| map.visits(vertex) as usize).collect();
     let edges = map.edges().map(|(a, b)| (usize::from(a), usize::from(b))).collect();
     (labels, visits, edges)
 }

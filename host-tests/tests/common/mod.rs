@@ -10,7 +10,7 @@ pub mod random;
 pub mod robot;
 pub mod watched;
 
-use toposlam::{Consistency, Direction, Evidence, Fingerprint, History, Map, NgramLength, NgramTable};
+use toposlam::{Consistency, Direction, Evidence, Fingerprint, History, Map, NgramLength, NgramTable, VertexId};
 use toposlam_host_tests::consistency::Hausdorff;
 use toposlam_host_tests::graph::Graph;
 use toposlam_host_tests::ngram::{Ngram, NgramSet};
@@ -25,6 +25,11 @@ pub fn fingerprint(label_mm: f64) -> Fingerprint {
     let steps = label_mm / f64::from(Fingerprint::STEP_MM);
     assert!(steps.fract() == 0.0, "{label_mm} mm is not on the grid");
     Fingerprint::from_steps(steps as u16).expect("labels of tests are in range")
+}
+
+/// The vertex with a number.
+pub fn vertex(number: usize) -> VertexId {
+    VertexId::new(number as u8).expect("tests number vertices from 0 to 63")
 }
 
 /// The core's length of n-grams.
@@ -45,7 +50,7 @@ pub fn core_map<const V: usize>(graph: &Graph) -> Map<V> {
         map.add_vertex(fingerprint(label_mm)).expect("tests keep to the capacity");
     }
     for (a, b) in graph.edges() {
-        map.add_edge(a as u8, b as u8);
+        map.add_edge(vertex(a), vertex(b));
     }
     map
 }

@@ -118,7 +118,7 @@ impl<'a> Robot<'a> {
     ) -> bool {
         let map = filter.map();
         let edges = map.edges().map(|(a, b)| (usize::from(a), usize::from(b)));
-        let graph = Graph::from_edges(map.vertices().into(), edges);
+        let graph = Graph::from_edges(map.vertices().len(), edges);
         let path: Vec<usize> = filter.path().map(usize::from).collect();
         let newest = &self.walk[self.walk.len() - path.len()..];
         let classes: Vec<usize> = newest.iter().filter_map(|&place| truth.class_of_place[place]).collect();

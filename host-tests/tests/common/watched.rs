@@ -32,7 +32,7 @@ pub struct Watched<const N: usize, const V: usize, const HISTORY: usize> {
     observations: Vec<Observation>,
     /// The published path after the last place.
     path: Vec<usize>,
-    vertices: u8,
+    vertices: usize,
     /// Whether an observation left the record: then counts and evidence hold more than the record shows.
     pub has_dropped: bool,
     /// What was counted.
@@ -109,7 +109,7 @@ impl<const N: usize, const V: usize, const HISTORY: usize> Watched<N, V, HISTORY
             self.check_evidence(&path);
         }
         self.path = path;
-        self.vertices = self.filter.map().vertices();
+        self.vertices = self.filter.map().vertices().len();
     }
 
     /// The observations as the reference reads them, of which the first begins a sequence.
@@ -132,8 +132,8 @@ impl<const N: usize, const V: usize, const HISTORY: usize> Watched<N, V, HISTORY
     }
 
     fn check_probabilities(&mut self) {
-        let of_place = |vertex: u8| f64::from(self.filter.place_probability_q16(vertex)) / ONE;
-        let sum: f64 = (0..self.filter.map().vertices()).map(of_place).sum();
+        let of_place = |vertex| f64::from(self.filter.place_probability_q16(vertex)) / ONE;
+        let sum: f64 = self.filter.map().vertices().map(of_place).sum();
         self.tally.stale += u32::from((sum - 1.0).abs() >= PROBABILITY_TOLERANCE);
         assert!(self.filter.map_probability_q16() <= ONE as u32);
         assert!(self.filter.map_probability_q16() > 0);
@@ -144,10 +144,10 @@ impl<const N: usize, const V: usize, const HISTORY: usize> Watched<N, V, HISTORY
         let observations = self.seen();
         let weighed = Weighed { observations: &observations, path, noise: self.noise() };
         let map = self.filter.map();
-        assert_eq!(usize::from(map.vertices()), weighed.vertices());
+        assert_eq!(map.vertices().len(), weighed.vertices());
         let edges: Vec<_> = map.edges().map(|(a, b)| (usize::from(a), usize::from(b))).collect();
         assert!(weighed.edges().into_iter().eq(edges), "the edges are those that were driven");
-        for (vertex, labels) in (0..).zip(weighed.labels()) {
+        for (vertex, labels) in map.vertices().zip(weighed.labels()) {
             let label = map.label(vertex).map_or(f64::NAN, |label| f64::from(label.steps()));
             assert!((label - mean(&labels)).abs() < 0.501, "a label is the rounded mean: {label} {labels:?}");
             assert_eq!(map.visits(vertex) as usize, labels.len());
@@ -174,27 +174,26 @@ impl<const N: usize, const V: usize, const HISTORY: usize> Watched<N, V, HISTORY
             self.tally.pruned += 1;
             return;
         }
-        let of_place = |vertex: usize| f64::from(self.filter.place_probability_q16(vertex as u8)) / ONE;
+        let of_place = |vertex: usize| f64::from(self.filter.place_probability_q16(super::vertex(vertex))) / ONE;
         let is_right = |(vertex, place): (usize, &f64)| (of_place(vertex) - place).abs() < PLACE_TOLERANCE;
         self.tally.stale += u32::from(!most.places.iter().enumerate().all(is_right));
     }
 
     /// A vertex is known by the same number as long as it is the same.
     fn check_names(&self, path: &[usize]) {
-        let vertices = self.filter.map().vertices();
+        let vertices = self.filter.map().vertices().len();
         let shared = || self.path.iter().copied().zip(path.iter().copied());
-        for before in 0..V as u8 {
-            let renamed = self.filter.renamed(before);
+        for before in 0..V {
+            let renamed = self.filter.renamed(super::vertex(before)).map(usize::from);
             assert!(renamed.is_none_or(|now| now < vertices), "{before} is now {renamed:?} of {vertices}");
             assert!(renamed.is_none() || before < self.vertices, "{before} was not there: {renamed:?}");
-            let mut now: Vec<usize> =
-                shared().filter(|&(was, _)| was == usize::from(before)).map(|(_, now)| now).collect();
+            let mut now: Vec<usize> = shared().filter(|&(was, _)| was == before).map(|(_, now)| now).collect();
             now.dedup();
             let &[now] = now.as_slice() else { continue };
-            assert_eq!(renamed.map(usize::from), Some(now), "all visits of {before} went there");
-            let kept_together = shared().all(|(was, is)| is != now || was == usize::from(before));
+            assert_eq!(renamed, Some(now), "all visits of {before} went there");
+            let kept_together = shared().all(|(was, is)| is != now || was == before);
             if kept_together && before < vertices {
-                assert_eq!(now, usize::from(before), "its visits stayed together: {:?} {path:?}", self.path);
+                assert_eq!(now, before, "its visits stayed together: {:?} {path:?}", self.path);
             }
         }
     }
@@ -236,7 +235,7 @@ impl<const N: usize, const V: usize, const HISTORY: usize> Watched<N, V, HISTORY
         let apart =
             walk.iter().zip(&labels[end + 1 - N_GRAM..]).map(|(&at, seen)| (mean_mm[usize::from(at)] - seen).abs());
         assert_eq!(apart.fold(0.0, f64::max), found_mm, "the walk is so far from the n-gram");
-        assert!(walk.windows(2).all(|pair| map.neighbours(pair[0]) >> pair[1] & 1 == 1), "{walk:?} is a walk");
+        assert!(walk.windows(2).all(|pair| map.neighbours(pair[0]).contains(pair[1])), "{walk:?} is a walk");
         if ends.len() + N_GRAM == labels.len() + 1 {
             let mut history = History::<16>::new();
             self.observations.iter().for_each(|seen| _ = history.push(seen.fingerprint));

@@ -10,7 +10,7 @@ fn known<const V: usize>(environment: &Environment, visits: u32) -> Map<V> {
         let vertex = map.add_vertex(label).unwrap();
         (1..visits).for_each(|_| map.observe(vertex, label));
     }
-    environment.graph().edges().iter().for_each(|&(a, b)| map.add_edge(a as u8, b as u8));
+    environment.graph().edges().iter().for_each(|&(a, b)| map.add_edge(vertex(a), vertex(b)));
     map
 }
 
@@ -36,7 +36,7 @@ fn look_around(filter: &mut Localiser, robot: &mut Robot) {
 
 /// The vertex whose number is that of its place.
 fn is_found(filter: &Localiser, robot: &Robot) -> bool {
-    let place = *robot.walk.last().unwrap() as u8;
+    let place = vertex(*robot.walk.last().unwrap());
     f64::from(filter.place_probability_q16(place)) > 0.9 * 65536.0 && filter.path().last() == Some(place)
 }
 
@@ -67,7 +67,7 @@ fn a_robot_with_a_map_finds_itself_within_a_few_places() {
                 let before = *filter.map();
                 let places = places_until_found(&mut filter, &mut robot);
                 assert!(filter.map().edges().eq(before.edges()) && filter.map().labels() == before.labels());
-                assert_eq!(filter.map().vertices(), before.vertices());
+                assert!(filter.map().vertices().eq(before.vertices()));
                 places
             };
             let places: Vec<usize> = (0..60).map(find).collect();
@@ -131,7 +131,7 @@ fn a_robot_that_stops_localising_maps_on() {
         let mut robot = Robot::new(&environment, Hints::default(), seed);
         let mut filter = localiser(&environment, seed);
         look_around(&mut filter, &mut robot);
-        let visits = |filter: &Localiser| (0..6).map(|vertex| filter.map().visits(vertex)).sum::<u32>();
+        let visits = |filter: &Localiser| VertexId::first(6).map(|vertex| filter.map().visits(vertex)).sum::<u32>();
         filter.set_localise_only(false);
         drive(&mut filter, &mut robot, 30);
         assert!(robot.is_all_mapped_by(&*filter), "seed {seed}: {:?}", filter.map().edges().collect::<Vec<_>>());
@@ -185,7 +185,7 @@ fn a_robot_that_localises_before_it_has_a_map_begins_to_map_when_it_may() {
     filter.set_localise_only(true);
     for index in 0..5 {
         assert_eq!(filter.observe(robot.step()).place_index, index);
-        assert_eq!((filter.map().vertices(), filter.path().count()), (0, 0));
+        assert_eq!((filter.map().vertices().len(), filter.path().count()), (0, 0));
     }
     filter.set_localise_only(false);
     let mut robot = Robot::new(&environment, Hints::default(), 1);

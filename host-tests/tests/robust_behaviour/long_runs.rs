@@ -9,16 +9,16 @@ fn ten_thousand_places<const HISTORY: usize>(environment: &Environment, hints: H
     let (mut exact, mut right) = (Vec::new(), 0);
     for place in 1..=PLACES {
         let update = filter.observe(robot.step());
-        let path: Vec<u8> = filter.path().collect();
+        let path: Vec<u8> = filter.path().map(u8::from).collect();
         if place > PLACES - 1000 {
-            right += usize::from(robot.place_of(&path, update.vertex) == robot.walk.last().copied());
+            right += usize::from(robot.place_of(&path, update.vertex.into()) == robot.walk.last().copied());
         }
         if place % 500 == 0 {
             exact.push(robot.is_all_mapped_by(&*filter));
         }
     }
     let map = filter.map();
-    let visits: Vec<u32> = (0..map.vertices()).map(|vertex| map.visits(vertex)).collect();
+    let visits: Vec<u32> = map.vertices().map(|vertex| map.visits(vertex)).collect();
     println!("{HISTORY}: exact {exact:?}, right {right} of the last 1000, visits {visits:?}");
     assert!(exact.iter().all(|&exact| exact), "{exact:?}");
     assert!(right >= 950, "{right}");

@@ -10,7 +10,8 @@ mod wrong_vertices;
 use common::drive::Random;
 use common::environments::{easy, floor, ring_with_a_repeated_part, six_rooms};
 use common::robot::{Hints, Robot, TURNS};
-use toposlam::{FaultKind, Fingerprint, Map, Observation, RobustConfig, RobustFilter, Turn};
+use common::vertex;
+use toposlam::{FaultKind, Fingerprint, Map, Observation, RobustConfig, RobustFilter, Turn, VertexId};
 use toposlam_eval::environment::Environment;
 use toposlam_eval::walk::all_walks;
 

@@ -15,7 +15,7 @@ fn mapped(robot: &mut Robot, seed: u64) -> Mapped {
         });
     }
     assert!(robot.is_all_mapped_by(&*filter), "seed {seed}: mapped in the end");
-    let path = filter.path().collect();
+    let path = filter.path().map(u8::from).collect();
     (filter, path)
 }
 
@@ -29,7 +29,7 @@ fn places_until_right_again(
     let recover = |seed: u64| {
         let mut robot = Robot::new(environment, hints, seed);
         let (mut filter, path) = mapped(&mut robot, seed);
-        let wrong = mistake(&robot, &path);
+        let wrong: Vec<_> = mistake(&robot, &path).into_iter().map(|at| vertex(at.into())).collect();
         filter.assume_path(&wrong).expect("the mistake is a path");
         assert!(!robot.is_all_mapped_by(&*filter), "seed {seed}: the mistake was made");
         until_exact(&mut filter, &mut robot, (200, polish)).unwrap_or(usize::MAX)

@@ -41,8 +41,8 @@ fn goes_on(filter: &mut Small) {
             begins: index % 11 == 10,
         };
         let update = filter.observe(observation);
-        assert!(filter.map().vertices() <= 6 && update.vertex < 6);
-        assert!(filter.path().all(|vertex| vertex < 6));
+        assert!(filter.map().vertices().len() <= 6 && update.vertex.index() < 6);
+        assert!(filter.path().all(|vertex| vertex.index() < 6));
         (0..3).for_each(|_| filter.polish());
         if index % 13 == 12 {
             filter.set_localise_only(index % 2 == 0);

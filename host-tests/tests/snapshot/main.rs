@@ -9,9 +9,10 @@ mod specification;
 
 use common::environments::{easy, floor, six_rooms};
 use common::robot::{Hints, Robot};
+use common::vertex;
 use toposlam::persist::Persist;
 use toposlam::persist::snapshot::{FILTER_SECTION, Reader, Snapshot, SnapshotError, Writer};
-use toposlam::{Fingerprint, Map, Observation, RobustConfig, RobustFilter, Update};
+use toposlam::{Fingerprint, Map, Observation, RobustConfig, RobustFilter, Update, VertexId};
 
 /// A drive: settings of a filter, and what becomes of it.
 #[derive(Clone)]
@@ -37,7 +38,9 @@ impl Drive {
                 let vertex = map.add_vertex(label).unwrap();
                 (0..3 * number).for_each(|_| map.observe(vertex, label));
             }
-            [(0, 1), (1, 2), (2, 3), (3, 4), (4, 0), (0, 2)].iter().for_each(|&(a, b)| map.add_edge(a, b));
+            [(0, 1), (1, 2), (2, 3), (3, 4), (4, 0), (0, 2)]
+                .iter()
+                .for_each(|&(a, b)| map.add_edge(vertex(a), vertex(b)));
             filter.start_with_map(config, 7, &map).unwrap();
         } else {
             filter.start(config, 7).unwrap();
@@ -72,11 +75,12 @@ struct Held {
 
 fn held<const N: usize, const V: usize, const T: usize>(filter: &RobustFilter<N, V, T>) -> Held {
     let map = filter.map();
-    let vertices: Vec<_> = (0..map.vertices())
+    let vertices: Vec<_> = map
+        .vertices()
         .map(|vertex| (map.label(vertex), map.visits(vertex).min(512), filter.place_probability_q16(vertex)))
         .collect();
     let edges: Vec<_> = map.edges().collect();
-    let renamed: Vec<_> = (0..V as u8).map(|before| filter.renamed(before)).collect();
+    let renamed: Vec<_> = VertexId::first(V).map(|before| filter.renamed(before)).collect();
     let path: Vec<_> = filter.path().collect();
     let (evidence, surplus) = filter.evidence();
     let told = format!(

@@ -118,7 +118,9 @@ impl FakeRobot {
             }
             Command::SetConfig(setting) => self.settings = self.settings.with(setting, HYPOTHESES, SONARS)?,
             Command::LocaliseOnly { on } => self.localise_only = on,
-            Command::GoTo { vertex } if vertex < self.mapper.map().vertices() => self.goal = Some(vertex),
+            Command::GoTo { vertex } if usize::from(vertex) < self.mapper.map().vertices().len() => {
+                self.goal = Some(vertex)
+            }
             Command::GoTo { .. } => return Err(Refusal::UnknownVertex),
             Command::Explore => self.goal = None,
             Command::Pause { on } => self.paused = on,

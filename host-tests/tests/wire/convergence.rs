@@ -1,12 +1,12 @@
 //! Listeners who join late, lose frames or hear them twice.
 
-use super::frame;
 use super::robot::{Random, Robot, TICKS_PER_HELLO};
+use super::{frame, vertex};
 use toposlam::wire::{
     Belief, Decoder, Evidence, List, Location, MapReplica, Message, Progress, QueueFull, Remapped, VertexProbability,
     Worst, map_digest,
 };
-use toposlam::{FaultCounters, FaultKind, Fingerprint, Map, Update, WorstNgram};
+use toposlam::{FaultCounters, FaultKind, Fingerprint, Map, Update, VertexId, WorstNgram};
 
 const V: usize = 16;
 
@@ -37,14 +37,14 @@ impl<const V: usize> Listener<V> {
 
 /// Whether the replica is the map, vertex by vertex and edge by edge (not by the digest).
 fn same<const V: usize, const W: usize>(replica: &MapReplica<W>, map: &Map<V>) -> bool {
-    replica.vertices() == map.vertices()
+    usize::from(replica.vertices()) == map.vertices().len()
         && replica.is_complete()
-        && replica.edges().eq(map.edges())
-        && (0..map.vertices()).all(|vertex| {
-            replica.row(vertex).is_some_and(|row| {
+        && replica.edges().eq(map.edges().map(|(a, b)| (a.into(), b.into())))
+        && map.vertices().all(|vertex| {
+            replica.row(vertex.into()).is_some_and(|row| {
                 Some(row.radius_mm) == map.label(vertex).map(Fingerprint::radius_mm)
                     && row.visits == map.visits(vertex)
-                    && row.neighbours == map.neighbours(vertex)
+                    && row.neighbours == map.neighbours(vertex).bits()
             })
         })
 }
@@ -84,8 +84,8 @@ fn one_new_vertex_and_its_edge_go_out_as_events() {
     robot.filter.map.add_vertex(Fingerprint::ZERO).expect("there is room");
     robot.place(&mut Random(3));
     robot.filter.map.add_vertex(Fingerprint::MAX).expect("there is room");
-    robot.filter.map.add_edge(0, 1);
-    robot.filter.location = 1;
+    robot.filter.map.add_edge(vertex(0), vertex(1));
+    robot.filter.location = vertex(1);
     let mut told = Vec::new();
     robot.reporter.update(&robot.filter, &robot.update(), |message| {
         told.push(*message);
@@ -107,10 +107,12 @@ fn one_new_vertex_and_its_edge_go_out_as_events() {
 /// A map of a chain of vertices with these labels, told to a listener.
 fn chain(labels: &[u16]) -> (Robot<V>, Listener<V>) {
     let mut robot = Robot::<V>::new(1);
-    for (vertex, &steps) in (0..).zip(labels) {
-        robot.filter.map.add_vertex(Fingerprint::from_steps(steps).expect("in range")).expect("there is room");
-        if vertex > 0 {
-            robot.filter.map.add_edge(vertex - 1, vertex);
+    let mut before = None;
+    for &steps in labels {
+        let label = Fingerprint::from_steps(steps).expect("in range");
+        let vertex = robot.filter.map.add_vertex(label).expect("there is room");
+        if let Some(before) = before.replace(vertex) {
+            robot.filter.map.add_edge(before, vertex);
         }
     }
     let mut listener = Listener::new();
@@ -122,14 +124,14 @@ fn chain(labels: &[u16]) -> (Robot<V>, Listener<V>) {
 fn a_merge_and_new_numbers_take_one_message_and_what_the_merge_itself_changes() {
     let (mut robot, mut listener) = chain(&[100, 200, 300, 400]);
     // Vertices 3 and 1 are one now; 0 and 2 change places. The chain 0-1-2-3 becomes a star around 1.
-    robot.filter.names = vec![Some(2), Some(1), Some(0), Some(1)];
+    robot.filter.names = [2, 1, 0, 1].map(|now| Some(vertex(now))).to_vec();
     robot.filter.map.clear();
     for steps in [300, 200, 100] {
         robot.filter.map.add_vertex(Fingerprint::from_steps(steps).expect("in range")).expect("there is room");
     }
-    robot.filter.map.observe(1, Fingerprint::from_steps(400).expect("in range"));
-    robot.filter.map.add_edge(0, 1);
-    robot.filter.map.add_edge(1, 2);
+    robot.filter.map.observe(vertex(1), Fingerprint::from_steps(400).expect("in range"));
+    robot.filter.map.add_edge(vertex(0), vertex(1));
+    robot.filter.map.add_edge(vertex(1), vertex(2));
     let mut told = Vec::new();
     let update = robot.update();
     robot.reporter.update(&robot.filter, &update, |message| {
@@ -147,8 +149,9 @@ fn a_merge_and_new_numbers_take_one_message_and_what_the_merge_itself_changes() 
 #[test]
 fn everything_that_was_heard_of_a_vertex_follows_its_new_number() {
     let (mut robot, mut listener) = chain(&[100, 200, 300, 400]);
-    robot.filter.location = 2;
-    robot.filter.worst = WorstNgram { distance_mm: 50, length: 3, newest_age: 1, vertices: [3, 2, 1, 0, 0, 0, 0] };
+    robot.filter.location = vertex(2);
+    robot.filter.worst =
+        WorstNgram { distance_mm: 50, length: 3, newest_age: 1, vertices: [3, 2, 1, 0, 0, 0, 0].map(vertex) };
     robot.place(&mut Random(0)).iter().for_each(|frame| listener.hear(frame));
     let rename = |listener: &mut Listener<V>, robot: &mut Robot<V>, names: &[u8]| {
         let renamed = Remapped { place_index: 2, vertices: List::new(names.iter().copied()) };
@@ -188,7 +191,7 @@ fn a_listener_that_lost_the_new_numbers_has_the_map_after_one_round_of_the_repea
         robot.repair(&mut random);
         // The frames are numbered; the first is the one that says which vertex is which.
         robot.place(&mut random).iter().skip(1).for_each(|frame| listener.hear(frame));
-        for _ in 0..robot.filter.map.vertices() + 4 {
+        for _ in 0..robot.filter.map.vertices().len() + 4 {
             robot.tick(&mut random).iter().for_each(|frame| listener.hear(frame));
         }
         assert!(listener.replica.is_converged() && same(&listener.replica, &robot.filter.map));
@@ -209,14 +212,14 @@ fn a_late_listener_has_everything_after_one_round_of_the_repeated_map() {
             robot.tick(&mut random);
         }
         let mut listener = Listener::<V>::new();
-        for _ in 0..robot.filter.map.vertices() + 4 {
+        for _ in 0..robot.filter.map.vertices().len() + 4 {
             assert!(!listener.replica.is_converged() || same(&listener.replica, &robot.filter.map));
             for frame in robot.tick(&mut random) {
                 listener.hear(&frame);
             }
         }
         assert!(listener.replica.is_converged() && same(&listener.replica, &robot.filter.map), "joined at {joined_at}");
-        assert_eq!(listener.replica.location().map(|location| location.vertex), Some(robot.filter.location));
+        assert_eq!(listener.replica.location().map(|location| location.vertex), Some(robot.filter.location.into()));
         assert_eq!(listener.replica.belief(), Some(Belief::of(&robot.filter, robot.place_index - 1)));
         assert_eq!(listener.replica.fault(FaultKind::BusError), 1);
         for _ in 0..TICKS_PER_HELLO {
@@ -260,7 +263,7 @@ fn hold_to_its_word(seed: u64, refused_percent: usize, mut line: impl FnMut(&mut
     }
     robot.refused_percent = 0;
     listener.hear(&[0]);
-    for _ in 0..robot.filter.map.vertices() + 4 {
+    for _ in 0..robot.filter.map.vertices().len() + 4 {
         for frame in robot.tick(&mut random) {
             listener.hear(&frame);
         }
@@ -318,7 +321,7 @@ fn overtaken_frames_are_ignored_and_the_map_still_comes() {
             frames.swap(first, first + 1);
         }
         frames.iter().for_each(|frame| listener.hear(frame));
-        for _ in 0..robot.filter.map.vertices() + 4 {
+        for _ in 0..robot.filter.map.vertices().len() + 4 {
             robot.tick(&mut random).iter().for_each(|frame| listener.hear(frame));
         }
         assert!(listener.replica.is_converged() && same(&listener.replica, &robot.filter.map));
@@ -344,10 +347,11 @@ fn a_robot_that_starts_anew_begins_with_an_empty_map() {
 fn a_map_of_64_vertices_arrives_whole() {
     let mut random = Random(62);
     let mut robot = Robot::<64>::new(1);
-    while robot.filter.map.vertices() < 64 {
+    while robot.filter.map.vertices().len() < 64 {
         robot.drive(&mut random);
     }
-    for (a, b) in (0..64).flat_map(|a| (0..64).map(move |b| (a, b))) {
+    let all = || VertexId::first(64);
+    for (a, b) in all().flat_map(|a| all().map(move |b| (a, b))) {
         robot.filter.map.add_edge(a, b);
     }
     let mut listener = Listener::<64>::new();
@@ -359,7 +363,7 @@ fn a_map_of_64_vertices_arrives_whole() {
 fn the_whole_map_is_sent_in_a_quarter_of_the_ticks_and_then_at_the_usual_pace() {
     let mut random = Random(11);
     let mut robot = Robot::<V>::new(1);
-    while robot.filter.map.vertices() < 14 {
+    while robot.filter.map.vertices().len() < 14 {
         robot.drive(&mut random);
         robot.place(&mut random);
     }

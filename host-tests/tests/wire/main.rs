@@ -13,7 +13,13 @@ mod specification;
 mod streams;
 
 use samples::{largest, typical};
+use toposlam::VertexId;
 use toposlam::wire::{Arrival, Decoder, Encoder, Header, MAX_FRAME_BYTES, Message, Payload, Progress};
+
+/// The vertex with a number.
+fn vertex(number: usize) -> VertexId {
+    VertexId::new(number as u8).expect("tests number vertices from 0 to 63")
+}
 
 /// The frame of a message or a request.
 fn frame(encoder: &mut Encoder, message: &impl Payload) -> Vec<u8> {

@@ -1,10 +1,10 @@
 //! A robot whose map changes at random, and what it sends.
 
-use super::frame;
+use super::{frame, vertex};
 use toposlam::wire::{Capacities, Encoder, Hello, Message, QueueFull, Reporter, ResetCause};
 use toposlam::{
     ConfigError, FaultCounters, FaultKind, Filter, FilterCapacities, Fingerprint, Map, Observation, RobustFactors,
-    Update, WeightFactors, WorstNgram,
+    Update, VertexId, WeightFactors, WorstNgram,
 };
 
 pub(crate) const TICKS_PER_HELLO: u16 = 20;
@@ -25,6 +25,11 @@ impl Random {
         (self.next() % bound as u64) as usize
     }
 
+    /// One of the first `count` vertices.
+    pub(crate) fn vertex(&mut self, count: usize) -> VertexId {
+        vertex(self.below(count))
+    }
+
     pub(crate) fn happens(&mut self, percent: usize) -> bool {
         self.below(100) < percent
     }
@@ -39,8 +44,8 @@ impl Random {
 pub(crate) struct Believer<const V: usize> {
     pub(crate) map: Map<V>,
     /// The number of each vertex of the map before, now.
-    pub(crate) names: Vec<Option<u8>>,
-    pub(crate) location: u8,
+    pub(crate) names: Vec<Option<VertexId>>,
+    pub(crate) location: VertexId,
     pub(crate) worst: WorstNgram,
     faults: FaultCounters,
 }
@@ -48,8 +53,13 @@ pub(crate) struct Believer<const V: usize> {
 impl<const V: usize> Filter<V> for Believer<V> {
     type Config = ();
 
-    const UNSTARTED: Self =
-        Self { map: Map::new(), names: Vec::new(), location: 0, worst: WorstNgram::NONE, faults: FaultCounters::new() };
+    const UNSTARTED: Self = Self {
+        map: Map::new(),
+        names: Vec::new(),
+        location: VertexId::FIRST,
+        worst: WorstNgram::NONE,
+        faults: FaultCounters::new(),
+    };
 
     fn capacities((): &()) -> FilterCapacities {
         FilterCapacities { hypotheses: 10, history: 256, ngram_length: 5 }
@@ -75,13 +85,13 @@ impl<const V: usize> Filter<V> for Believer<V> {
         &self.faults
     }
 
-    fn recent(&self, ago: usize) -> Option<u8> {
+    fn recent(&self, ago: usize) -> Option<VertexId> {
         (ago == 0).then_some(self.location)
     }
 
     /// Two thirds for the location, the rest among the vertices beside it.
-    fn place_probability_q16(&self, vertex: u8) -> u32 {
-        match vertex.abs_diff(self.location) {
+    fn place_probability_q16(&self, vertex: VertexId) -> u32 {
+        match vertex.index().abs_diff(self.location.index()) {
             0 => 43_691,
             1 => 10_923,
             _ => 0,
@@ -92,8 +102,8 @@ impl<const V: usize> Filter<V> for Believer<V> {
         1 << 15
     }
 
-    fn renamed(&self, before: u8) -> Option<u8> {
-        self.names.get(usize::from(before)).copied().unwrap_or(Some(before))
+    fn renamed(&self, before: VertexId) -> Option<VertexId> {
+        self.names.get(before.index()).copied().unwrap_or(Some(before))
     }
 
     fn worst(&self) -> WorstNgram {
@@ -139,11 +149,11 @@ impl<const V: usize> Robot<V> {
         let Believer { map, location, names, .. } = &mut self.filter;
         names.clear();
         let from = *location;
-        let known = map.vertices();
+        let known = map.vertices().len();
         *location = if known == 0 || random.happens(30) {
             map.add_vertex(random.fingerprint()).unwrap_or(from)
         } else {
-            let vertex = random.below(known.into()) as u8;
+            let vertex = random.vertex(known);
             map.observe(vertex, random.fingerprint());
             vertex
         };
@@ -162,11 +172,11 @@ impl<const V: usize> Robot<V> {
         for _ in 0..=random.below(V) {
             map.add_vertex(random.fingerprint()).expect("there is room");
         }
-        let vertices = usize::from(map.vertices());
+        let vertices = map.vertices().len();
         for _ in 0..random.below(2 * vertices) {
-            map.add_edge(random.below(vertices) as u8, random.below(vertices) as u8);
+            map.add_edge(random.vertex(vertices), random.vertex(vertices));
         }
-        *location = random.below(vertices) as u8;
+        *location = random.vertex(vertices);
         self.name_a_worst(random);
     }
 
@@ -177,17 +187,17 @@ impl<const V: usize> Robot<V> {
         let before = *map;
         let old = before.vertices();
         // Where each vertex of the new map comes from, in random order.
-        let mut origins: Vec<Option<u8>> = (0..old).filter(|_| !random.happens(15)).map(Some).collect();
+        let mut origins: Vec<Option<VertexId>> = old.clone().filter(|_| !random.happens(15)).map(Some).collect();
         if origins.len() < V && random.happens(50) || origins.is_empty() {
             origins.push(None);
         }
         for last in (1..origins.len()).rev() {
             origins.swap(last, random.below(last + 1));
         }
-        *names = (0..old)
-            .map(|vertex| match origins.iter().position(|&origin| origin == Some(vertex)) {
-                Some(now) => Some(now as u8),
-                None if random.happens(50) => Some(random.below(origins.len()) as u8),
+        *names = old
+            .map(|before| match origins.iter().position(|&origin| origin == Some(before)) {
+                Some(now) => Some(vertex(now)),
+                None if random.happens(50) => Some(random.vertex(origins.len())),
                 None => None,
             })
             .collect();
@@ -197,15 +207,15 @@ impl<const V: usize> Robot<V> {
             map.add_vertex(label).expect("there is room");
         }
         for (a, b) in before.edges().filter(|_| !random.happens(5)) {
-            if let (Some(a), Some(b)) = (names[usize::from(a)], names[usize::from(b)])
+            if let (Some(a), Some(b)) = (names[a.index()], names[b.index()])
                 && a != b
             {
                 map.add_edge(a, b);
             }
         }
-        let vertices = usize::from(map.vertices());
-        map.add_edge(random.below(vertices) as u8, random.below(vertices) as u8);
-        *location = names.get(usize::from(*location)).copied().flatten().unwrap_or(0);
+        let vertices = map.vertices().len();
+        map.add_edge(random.vertex(vertices), random.vertex(vertices));
+        *location = names.get(location.index()).copied().flatten().unwrap_or(VertexId::FIRST);
         self.name_a_worst(random);
     }
 
@@ -219,8 +229,8 @@ impl<const V: usize> Robot<V> {
     }
 
     fn name_a_worst(&mut self, random: &mut Random) {
-        let vertices = self.filter.map.vertices().into();
-        let walk: [u8; 7] = std::array::from_fn(|_| random.below(vertices) as u8);
+        let vertices = self.filter.map.vertices().len();
+        let walk = std::array::from_fn(|_| random.vertex(vertices));
         let length = random.below(8) as u8;
         self.filter.worst = WorstNgram { distance_mm: 200, length, newest_age: 9, vertices: walk };
     }

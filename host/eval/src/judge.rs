@@ -9,7 +9,7 @@ use super::{
     trial::{Trial, Truth},
 };
 use std::time::{Duration, Instant};
-use toposlam::{Consistency, Direction, Evidence, History, Map, NgramLength};
+use toposlam::{Consistency, Direction, Evidence, History, Map, NgramLength, VertexId};
 
 /// Whether a map is exact is looked at after every so many places, and at the check points.
 pub const EXACT_EVERY: usize = 10;
@@ -110,7 +110,7 @@ fn leaves_truth(candidate: &dyn Candidate, truth: &Truth, before: usize, slices:
     }
     // The filter numbers vertices by first visit.
     let mut seen = Vec::new();
-    let path: Vec<u8> = truth
+    let path: Vec<VertexId> = truth
         .classes
         .iter()
         .map(|class| {
@@ -118,16 +118,16 @@ fn leaves_truth(candidate: &dyn Candidate, truth: &Truth, before: usize, slices:
                 seen.push(*class);
                 seen.len() - 1
             });
-            u8::try_from(number).unwrap_or(u8::MAX)
+            VertexId::new(u8::try_from(number).ok()?)
         })
-        .collect();
+        .collect::<Option<_>>()?;
     let (map, path) = candidate.search_from(&path, slices)?;
     Some(!score_map_from(&graph_of(&map), &path, &truth.graph, &truth.classes, before).exact)
 }
 
 fn graph_of(map: &Map<VERTICES>) -> Graph {
     let edges = map.edges().map(|(a, b)| (usize::from(a), usize::from(b)));
-    Graph::from_edges(usize::from(map.vertices()), edges)
+    Graph::from_edges(map.vertices().len(), edges)
 }
 
 /// The distance of a map after so many places of the path, in millimetres.
@@ -202,7 +202,7 @@ mod tests {
 
         fn polish(&mut self, _slices: u32) {}
 
-        fn search_from(&self, _path: &[u8], _slices: u32) -> Option<(Map<VERTICES>, Vec<usize>)> {
+        fn search_from(&self, _path: &[VertexId], _slices: u32) -> Option<(Map<VERTICES>, Vec<usize>)> {
             None
         }
 
@@ -223,10 +223,9 @@ mod tests {
 
     fn oracle<const LOST_FOR: usize>(_: &Settings, trial: &Trial) -> Box<dyn Candidate> {
         let mut map = Map::new();
-        for place in trial.environment.places() {
-            map.add_vertex(Fingerprint::from_radius_mm(place.mean_mm as u16).unwrap()).unwrap();
-        }
-        trial.environment.graph().edges().iter().for_each(|&(a, b)| map.add_edge(a as u8, b as u8));
+        let radii = trial.environment.places().iter().map(|place| Fingerprint::from_radius_mm(place.mean_mm as u16));
+        let vertices: Vec<_> = radii.map(|radius| map.add_vertex(radius.unwrap()).unwrap()).collect();
+        trial.environment.graph().edges().iter().for_each(|&(a, b)| map.add_edge(vertices[a], vertices[b]));
         let places = trial.mapped_before().iter().flatten().chain(&trial.visits).map(|visit| visit.place).collect();
         Box::new(Oracle { map, places, seen: 0, lost_for: LOST_FOR })
     }

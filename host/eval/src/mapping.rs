@@ -84,10 +84,10 @@ impl<const SONARS: usize> Mapping<SONARS> {
         let (place, update) = either!(&mut self.stages, mapper => mapper.observe(frame, turn))?;
         if let Stages::Paper(mapper, ancestry) = &mut self.stages {
             let particles = mapper.filter().particles().iter();
-            ancestry.advance(particles.map(|particle| (particle.parent.into(), particle.place.into())));
+            ancestry.advance(particles.map(|particle| (particle.parent.into(), particle.at.into())));
         }
         let map = self.map();
-        let step = Step { place, update, vertices: map.vertices(), edges: map.edges().count() };
+        let step = Step { place, update, vertices: map.vertices().len() as u8, edges: map.edges().count() };
         self.steps.push(step);
         Some(step)
     }
@@ -149,7 +149,7 @@ pub fn score_path<const V: usize>(
     nodes: &[Option<usize>],
 ) -> MapScore {
     let edges = map.edges().map(|(a, b)| (usize::from(a), usize::from(b)));
-    let map = Graph::from_edges(map.vertices().into(), edges);
+    let map = Graph::from_edges(map.vertices().len(), edges);
     let mut visited: Vec<usize> = nodes.iter().copied().flatten().collect();
     visited.sort_unstable();
     visited.dedup();

@@ -18,8 +18,8 @@
 //! ```
 
 use petgraph::graph::UnGraph;
-use toposlam::Map;
 use toposlam::wire::{MapReplica, crc32};
+use toposlam::{Map, VertexId};
 
 /// The vertices of a map and the edges between them.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Hash)]
@@ -91,11 +91,12 @@ impl<const V: usize> From<&MapReplica<V>> for TopologicalMap {
 
 impl<const V: usize> From<&Map<V>> for TopologicalMap {
     fn from(map: &Map<V>) -> Self {
-        let label = |(vertex, label): (u8, &toposlam::Fingerprint)| Vertex {
+        let label = |(vertex, label): (VertexId, &toposlam::Fingerprint)| Vertex {
             radius_mm: label.radius_mm(),
             visits: map.visits(vertex),
         };
-        Self { vertices: (0..).zip(map.labels()).map(label).collect(), edges: map.edges().collect() }
+        let edges = map.edges().map(|(a, b)| (a.into(), b.into()));
+        Self { vertices: map.vertices().zip(map.labels()).map(label).collect(), edges: edges.collect() }
     }
 }
 
@@ -106,11 +107,10 @@ mod tests {
     #[test]
     fn the_digest_is_the_one_that_a_robot_has_of_the_same_map() {
         let mut map: Map<8> = Map::new();
-        for radius_mm in [1200, 400, 700] {
-            map.add_vertex(toposlam::Fingerprint::from_radius_mm(radius_mm).unwrap()).unwrap();
-        }
-        map.add_edge(0, 2);
-        map.add_edge(1, 1);
+        let radius = |radius_mm| toposlam::Fingerprint::from_radius_mm(radius_mm).unwrap();
+        let [a, b, c] = [1200, 400, 700].map(|radius_mm| map.add_vertex(radius(radius_mm)).unwrap());
+        map.add_edge(a, c);
+        map.add_edge(b, b);
         assert_eq!(TopologicalMap::from(&map).digest(), toposlam::wire::map_digest(&map));
         assert_eq!(TopologicalMap::default().digest(), toposlam::wire::map_digest(&Map::<8>::new()));
     }

@@ -150,7 +150,7 @@ impl<'buffer> Exploration<'buffer> {
             let frame_index = place.frame_index.saturating_add(self.frames_not_taken);
             self.note(&Place { frame_index, ..*place });
             let map = self.robot.mapper().map();
-            let (vertices, edges) = (map.vertices(), map.edges().count());
+            let (vertices, edges) = (map.vertices().len() as u8, map.edges().count());
             self.steps.push(Step { place: *place, update: *update, vertices, edges });
         }
         seen

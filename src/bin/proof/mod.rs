@@ -11,8 +11,8 @@ use core::{
 use static_cell::ConstStaticCell;
 use toposlam::{
     Config, ConfigError, Consistency, Direction, FaultCounters, FaultKind, Fingerprint, FingerprintError, History, Map,
-    Ngram, NgramError, NgramLength, NgramTable, NgramsFull, Observation, PaperFilter, Prior, RobustConfig,
-    RobustFilter, Turn, VerticesFull,
+    Ngram, NgramError, NgramLength, NgramTable, NgramsFull, Observation, PaperFilter, PerVertex, Prior, RobustConfig,
+    RobustFilter, Turn, VertexId, VertexSet, VerticesFull,
     persist::Persist,
     persist::snapshot::{FILTER_SECTION, Resume, Snapshot, SnapshotError, SnapshotPolicy, Writer},
     place::{PlaceConfig, PlaceDetector},
@@ -136,6 +136,10 @@ fn table(length: NgramLength, ngram: Ngram) {
     table.clear();
 }
 
+fn any_vertex() -> VertexId {
+    VertexId::new(black_box(1)).unwrap_or(VertexId::FIRST)
+}
+
 pub(crate) fn map_and_history() {
     static MAP: ConstStaticCell<Map<VERTICES>> = ConstStaticCell::new(Map::new());
     let Some(map) = MAP.try_take() else { return };
@@ -144,9 +148,22 @@ pub(crate) fn map_and_history() {
             show::<VerticesFull>(error);
         }
     }
-    map.observe(black_box(1), any_fingerprint());
-    map.add_edge(black_box(1), black_box(2));
-    black_box((map.vertices(), map.label(black_box(1)), map.visits(black_box(1)), map.neighbours(black_box(1))));
+    map.observe(any_vertex(), any_fingerprint());
+    map.add_edge(any_vertex(), any_vertex());
+    black_box((map.vertices().len(), map.contains(any_vertex()), map.label(any_vertex()), map.visits(any_vertex())));
+    let mut set = map.neighbours(any_vertex());
+    set.insert(any_vertex());
+    set.remove(any_vertex());
+    black_box((set.contains(any_vertex()), set.len(), set.is_empty(), set.bits(), set.pop_first()));
+    black_box(
+        set | VertexSet::from(any_vertex()) & VertexSet::first(black_box(3)) - VertexSet::from_bits(black_box(7)),
+    );
+    for vertex in set.iter() {
+        black_box(vertex);
+    }
+    let mut per_vertex = PerVertex::<u32, 10>::filled(0);
+    per_vertex[any_vertex()] = black_box(1);
+    black_box((per_vertex[any_vertex()], per_vertex.get(any_vertex())));
     black_box(map.labels());
     for edge in map.edges() {
         black_box(edge);
@@ -211,13 +228,13 @@ fn robust<const N: usize, const V: usize, const HISTORY: usize>(filter: &mut Rob
         filter.set_localise_only(black_box(true));
         filter.polish();
         black_box(filter.refresh());
-        black_box(filter.assume_path(black_box(&[0, 1, 0])));
+        black_box(filter.assume_path(&[any_vertex(); 3]));
     }
     let map = *filter.map();
     let restarted = filter.start_with_map(RobustConfig::default().opaque(), black_box(1), black_box(&map));
     let _ = black_box((restarted, filter.evidence(), filter.noise_mm()));
-    black_box((filter.map(), filter.observed(), filter.faults(), filter.renamed(black_box(3)), filter.worst()));
-    black_box((filter.place_probability_q16(black_box(3)), filter.map_probability_q16()));
+    black_box((filter.map(), filter.observed(), filter.faults(), filter.renamed(any_vertex()), filter.worst()));
+    black_box((filter.place_probability_q16(any_vertex()), filter.map_probability_q16()));
     for vertex in filter.path() {
         black_box(vertex);
     }

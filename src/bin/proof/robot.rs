@@ -5,7 +5,6 @@ use core::hint::black_box;
 
 use embedded_hal::{digital, pwm};
 use static_cell::ConstStaticCell;
-use toposlam::FaultCounters;
 use toposlam::drive::{
     DifferentialDrive, Drive, DriveConfig, Goal, MotorError, VelocityCommand, WheelSpeeds, WheelsConfig,
 };
@@ -13,6 +12,7 @@ use toposlam::persist::snapshot::{Resume, SnapshotError};
 use toposlam::reference::{self, HISTORY, ReferenceRobot, SNAPSHOT_BYTES, VERTICES};
 use toposlam::robot::{Board, SaveError};
 use toposlam::wire::QueueFull;
+use toposlam::{FaultCounters, VertexId};
 
 use super::{Opaque, any_frame, show};
 
@@ -101,7 +101,7 @@ pub(crate) fn drive() {
     if let Err(error) = drive.start(DriveConfig::DEFAULT.opaque(), black_box(1)).and(drive.set_speed(black_box(3))) {
         show::<toposlam::ConfigError>(error);
     }
-    drive.set_goal(Goal::Vertex(3).opaque());
+    drive.set_goal(Goal::Vertex(VertexId::FIRST).opaque());
     drive.kidnapped();
     black_box((drive.turn(), drive.goal(), drive.goal_status(), drive.state(), drive.holds_place(), drive.faults()));
 }

@@ -39,7 +39,7 @@ use rand_core::Rng;
 ///     filter.observe(Fingerprint::from_radius_mm(radius_mm)?);
 /// }
 /// let best = filter.best();
-/// assert_eq!((best.map.vertices(), best.place), (2, 0));
+/// assert_eq!((best.map.vertices().len(), best.at.index()), (2, 0));
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 #[derive(Clone, Debug)]
@@ -162,8 +162,8 @@ impl<const N: usize, const V: usize, const WORDS: usize> PaperFilter<N, V, WORDS
         let best = self.best();
         let update = Update {
             place_index: self.observed,
-            vertex: best.place,
-            is_new: best.map.visits(best.place) == 1,
+            vertex: best.at,
+            is_new: best.map.visits(best.at) == 1,
             consistency_mm: best.consistency_mm,
             factors: WeightFactors::Paper(best.factors),
             lead_q16: step.lead_q16,

@@ -1,7 +1,7 @@
 //! One particle: a map, the place the robot is at, and the weight (Section III.A).
 
 use crate::filter::PaperFactors;
-use crate::{Fingerprint, Map};
+use crate::{Fingerprint, Map, VertexId};
 
 /// One hypothesis: a map and the place the robot is at.
 #[derive(Clone, Copy, Debug)]
@@ -9,7 +9,7 @@ pub struct Particle<const V: usize> {
     /// The map.
     pub map: Map<V>,
     /// The vertex the robot is at.
-    pub place: u8,
+    pub at: VertexId,
     /// How many of the N draws chose this particle.
     pub multiplicity: u8,
     /// The index, among the particles before the last observation, of the one this particle came from.
@@ -21,8 +21,14 @@ pub struct Particle<const V: usize> {
 }
 
 impl<const V: usize> Particle<V> {
-    pub(super) const NONE: Self =
-        Self { map: Map::new(), place: 0, multiplicity: 0, parent: 0, consistency_mm: 0, factors: PaperFactors::ONE };
+    pub(super) const NONE: Self = Self {
+        map: Map::new(),
+        at: VertexId::FIRST,
+        multiplicity: 0,
+        parent: 0,
+        consistency_mm: 0,
+        factors: PaperFactors::ONE,
+    };
 }
 
 /// Predicts that the robot went from the place of a particle to a vertex, a new one behind the last: the edge is added
@@ -30,17 +36,17 @@ impl<const V: usize> Particle<V> {
 pub(super) fn predict<const V: usize>(
     predicted: &mut Map<V>,
     parent: &Particle<V>,
-    vertex: u8,
+    vertex: VertexId,
     observation: Fingerprint,
 ) {
     *predicted = parent.map;
-    if vertex == parent.map.vertices() {
+    if parent.map.contains(vertex) {
+        predicted.observe(vertex, observation);
+    } else {
         // The pool has no candidate for a vertex that a full map has no room for.
         let _ = predicted.add_vertex(observation);
-    } else {
-        predicted.observe(vertex, observation);
     }
-    if parent.map.vertices() > 0 {
-        predicted.add_edge(parent.place, vertex);
+    if parent.map.contains(parent.at) {
+        predicted.add_edge(parent.at, vertex);
     }
 }

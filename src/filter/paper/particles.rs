@@ -5,6 +5,7 @@ use super::resample::PROPOSAL_REACH;
 use super::selection::{Candidate, Choice, Selection};
 use crate::filter::paper::consistency::{Consistency, Direction, Evidence};
 use crate::filter::paper::likelihood::Likelihood;
+use crate::map::PerVertex;
 use crate::{Config, Fingerprint, Map, NgramLength};
 
 /// What a step tells besides the particles.
@@ -23,7 +24,7 @@ pub(super) struct Particles<const N: usize, const V: usize> {
     best: u8,
     wanted: u8,
     /// For every particle, one candidate a vertex, and the new vertex behind the last one while there is room.
-    pool: [[Candidate; V]; N],
+    pool: [PerVertex<Candidate, V>; N],
     predicted: Map<V>,
     likelihood: Likelihood,
 }
@@ -36,7 +37,7 @@ impl<const N: usize, const V: usize> Particles<N, V> {
             distinct: 0,
             best: 0,
             wanted: 0,
-            pool: [[Candidate::UNSET; V]; N],
+            pool: [PerVertex::filled(Candidate::UNSET); N],
             predicted: Map::new(),
             likelihood: Likelihood::new(),
         }
@@ -91,12 +92,12 @@ impl<const N: usize, const V: usize> Particles<N, V> {
             direction,
             evidence,
             consistency,
-            weights: [[0; V]; N],
+            weights: [PerVertex::filled(0); N],
             nearest_mm: 0,
         };
         selection.predict();
         selection.find_nearest();
-        let mut chosen = [Choice::default(); N];
+        let mut chosen = [Choice::FIRST; N];
         let chosen = chosen.get_mut(..usize::from(self.wanted)).unwrap_or(&mut []);
         selection.draw(chosen, random);
 
@@ -111,7 +112,7 @@ impl<const N: usize, const V: usize> Particles<N, V> {
             rest = rest.get(multiplicity..).unwrap_or(&[]);
             let (Some(child), Some(parent)) = (children.next(), parents.get(usize::from(choice.parent))) else { break };
             predict(&mut child.map, parent, choice.vertex, observation);
-            child.place = choice.vertex;
+            child.at = choice.vertex;
             child.multiplicity = multiplicity as u8;
             child.parent = choice.parent;
             (child.consistency_mm, child.factors) = selection.judge(parent, choice);
@@ -125,7 +126,7 @@ impl<const N: usize, const V: usize> Particles<N, V> {
         let lead_q16 = heaviest.map_or(0, |(ln_weight, choice)| ln_weight.saturating_sub(selection.ln_rival(choice)));
         self.distinct = drawn;
         self.current = !self.current;
-        let vertices_full = parents.iter().any(|parent| usize::from(parent.map.vertices()) == V);
+        let vertices_full = parents.iter().any(|parent| parent.map.vertices().len() == V);
         Step { lead_q16: lead_q16.min(PROPOSAL_REACH), vertices_full }
     }
 }

@@ -5,14 +5,19 @@ use super::resample::{DISTANCE_REACH, PROPOSAL_REACH, PROPOSALS, accepts, draw_w
 use crate::filter::PaperFactors;
 use crate::filter::paper::consistency::{Consistency, Direction, Evidence};
 use crate::filter::paper::likelihood::Likelihood;
-use crate::{Fingerprint, Map, NgramLength};
+use crate::map::PerVertex;
+use crate::{Fingerprint, Map, NgramLength, VertexId};
 
 /// A prediction: that the robot of a particle went to a vertex, a new one behind the last of its map. In the order of the
 /// pool.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(super) struct Choice {
     pub(super) parent: u8,
-    pub(super) vertex: u8,
+    pub(super) vertex: VertexId,
+}
+
+impl Choice {
+    pub(super) const FIRST: Self = Self { parent: 0, vertex: VertexId::FIRST };
 }
 
 /// A prediction in the pool.
@@ -41,7 +46,7 @@ impl Candidate {
 /// The particles of one place, the pool of their predictions, and what these are held against.
 pub(super) struct Selection<'a, E, const N: usize, const V: usize, const WORDS: usize, const INDICES: usize> {
     pub(super) parents: &'a [Particle<V>],
-    pub(super) pool: &'a mut [[Candidate; V]; N],
+    pub(super) pool: &'a mut [PerVertex<Candidate, V>; N],
     pub(super) predicted: &'a mut Map<V>,
     pub(super) likelihood: &'a Likelihood,
     pub(super) observation: Fingerprint,
@@ -50,7 +55,7 @@ pub(super) struct Selection<'a, E, const N: usize, const V: usize, const WORDS: 
     pub(super) evidence: &'a E,
     pub(super) consistency: &'a mut Consistency<V, WORDS, INDICES>,
     /// How often each prediction is proposed.
-    pub(super) weights: [[u32; V]; N],
+    pub(super) weights: [PerVertex<u32, V>; N],
     /// The smallest distance of Eq. 2 in the pool, in millimetres.
     pub(super) nearest_mm: u16,
 }
@@ -62,16 +67,16 @@ impl<E: Evidence<WORDS>, const N: usize, const V: usize, const WORDS: usize, con
     pub(super) fn predict(&mut self) {
         let mut ln_best = i32::MIN;
         for (parent, candidates) in self.parents.iter().zip(self.pool.iter_mut()) {
-            for (vertex, candidate) in (0..=parent.map.vertices()).zip(candidates) {
+            for vertex in successors(&parent.map) {
                 let ln_label = ln_label(self.likelihood, parent, vertex, self.observation);
                 let ln_proposal = ln_size(self.likelihood, parent, vertex, self.observation).saturating_add(ln_label);
-                *candidate = Candidate { ln_proposal, distance: Distance::Unknown };
+                candidates[vertex] = Candidate { ln_proposal, distance: Distance::Unknown };
                 ln_best = ln_best.max(ln_proposal);
             }
         }
         for ((parent, candidates), weights) in self.parents.iter().zip(self.pool.iter()).zip(&mut self.weights) {
-            for ((_, candidate), weight) in (0..=parent.map.vertices()).zip(candidates).zip(weights) {
-                *weight = draw_weight(candidate.ln_proposal, ln_best) * u32::from(parent.multiplicity);
+            for vertex in successors(&parent.map) {
+                weights[vertex] = draw_weight(candidates[vertex].ln_proposal, ln_best) * u32::from(parent.multiplicity);
             }
         }
     }
@@ -164,9 +169,8 @@ impl<E: Evidence<WORDS>, const N: usize, const V: usize, const WORDS: usize, con
             if self.weight(choice) > 0 {
                 let multiplicity = self.parents.get(usize::from(choice.parent)).map_or(0, |parent| parent.multiplicity);
                 let weight = draw_weight(self.ln_weight(choice), ln_best) * u32::from(multiplicity);
-                let weights = self.weights.get_mut(usize::from(choice.parent));
-                if let Some(slot) = weights.and_then(|weights| weights.get_mut(usize::from(choice.vertex))) {
-                    *slot = weight;
+                if let Some(weights) = self.weights.get_mut(usize::from(choice.parent)) {
+                    weights[choice.vertex] = weight;
                 }
             }
         }
@@ -223,12 +227,11 @@ impl<E: Evidence<WORDS>, const N: usize, const V: usize, const WORDS: usize, con
     }
 
     fn weight(&self, choice: Choice) -> u32 {
-        let weights = self.weights.get(usize::from(choice.parent));
-        weights.and_then(|weights| weights.get(usize::from(choice.vertex))).copied().unwrap_or(0)
+        self.weights.get(usize::from(choice.parent)).map_or(0, |weights| weights[choice.vertex])
     }
 
     fn candidate(&self, choice: Choice) -> Option<&Candidate> {
-        self.pool.get(usize::from(choice.parent))?.get(usize::from(choice.vertex))
+        self.pool.get(usize::from(choice.parent)).map(|candidates| &candidates[choice.vertex])
     }
 
     /// ln of Eq. 6, relative to the largest Eq. 8.
@@ -274,9 +277,8 @@ impl<E: Evidence<WORDS>, const N: usize, const V: usize, const WORDS: usize, con
     }
 
     fn know(&mut self, choice: Choice, distance: Distance) {
-        let candidates = self.pool.get_mut(usize::from(choice.parent));
-        if let Some(candidate) = candidates.and_then(|candidates| candidates.get_mut(usize::from(choice.vertex))) {
-            candidate.distance = distance;
+        if let Some(candidates) = self.pool.get_mut(usize::from(choice.parent)) {
+            candidates[choice.vertex].distance = distance;
         }
     }
 
@@ -294,26 +296,36 @@ impl<E: Evidence<WORDS>, const N: usize, const V: usize, const WORDS: usize, con
 fn choices<const V: usize>(parents: &[Particle<V>]) -> impl Iterator<Item = Choice> + '_ {
     (0_u8..)
         .zip(parents)
-        .flat_map(|(index, parent)| (0..=parent.map.vertices()).map(move |vertex| Choice { parent: index, vertex }))
+        .flat_map(|(index, parent)| successors(&parent.map).map(move |vertex| Choice { parent: index, vertex }))
+}
+
+/// The vertices that the robot can go to: those of a map, and a new one while there is room.
+fn successors<const V: usize>(map: &Map<V>) -> impl Iterator<Item = VertexId> + use<V> {
+    VertexId::first((map.vertices().len() + 1).min(V))
 }
 
 /// ln of Eq. 7 for a prediction. The observation is compared with what the label was before; a new vertex fits.
 fn ln_label<const V: usize>(
     likelihood: &Likelihood,
     parent: &Particle<V>,
-    vertex: u8,
+    vertex: VertexId,
     observation: Fingerprint,
 ) -> i32 {
     parent.map.label(vertex).map_or(0, |label| likelihood.ln_label(observation, label))
 }
 
 /// ln of Eq. 9 for a prediction, from that of its parent.
-fn ln_size<const V: usize>(likelihood: &Likelihood, parent: &Particle<V>, vertex: u8, observation: Fingerprint) -> i32 {
+fn ln_size<const V: usize>(
+    likelihood: &Likelihood,
+    parent: &Particle<V>,
+    vertex: VertexId,
+    observation: Fingerprint,
+) -> i32 {
     let (before, after) = (parent.map.label(vertex), parent.map.label_with(vertex, observation));
     if before == Some(after) {
         return parent.factors.ln_size_q16;
     }
-    let others = parent.map.labels().iter().enumerate().filter(|&(other, _)| other != usize::from(vertex));
+    let others = parent.map.labels().iter().enumerate().filter(|&(other, _)| other != vertex.index());
     let change = likelihood.ln_size_change(others.map(|(_, &label)| label), before, after);
     parent.factors.ln_size_q16.saturating_add(change)
 }

@@ -117,15 +117,15 @@ impl<const V: usize, const T: usize> Hypothesis<V, T> {
     /// A hypothesis that knows a map and has seen nothing yet.
     pub(super) fn know(&mut self, map: &Map<V>, deviation_steps: f32) {
         self.clear();
-        self.vertices = map.vertices();
-        for vertex in 0..map.vertices() {
-            let slot = usize::from(vertex);
+        self.vertices = map.vertices().len() as u8;
+        for vertex in map.vertices() {
+            let slot = vertex.index();
             if let (Some(settled), Some(row), Some(label)) =
                 (self.settled.get_mut(slot), self.settled_neighbours.get_mut(slot), map.label(vertex))
             {
                 *settled = Tally::known(label, map.visits(vertex).min(u32::from(u16::MAX)) as u16, deviation_steps);
                 // A loop says that the place is its own neighbour, which no path of this filter uses.
-                *row = map.neighbours(vertex) as u32 & !(1 << (vertex & 31));
+                *row = map.neighbours(vertex).bits() as u32 & !(1 << (u8::from(vertex) & 31));
             }
         }
     }

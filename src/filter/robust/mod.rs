@@ -31,7 +31,7 @@ pub use config::RobustConfig;
 pub(super) use worst::LENGTH as NGRAM_LENGTH;
 
 use super::{Update, WorstNgram, draws};
-use crate::{ConfigError, FaultCounters, FaultKind, Fingerprint, Map, Observation};
+use crate::{ConfigError, FaultCounters, FaultKind, Fingerprint, Map, Observation, VertexId};
 use beam::Beam;
 use decode::Decoder;
 use forward::Forward;
@@ -66,8 +66,8 @@ const SOFTENED: u8 = 3;
 ///     filter.polish();
 ///     assert_eq!(update.place_index + 1, filter.observed());
 /// }
-/// assert_eq!(filter.map().vertices(), 2);
-/// assert!(filter.path().eq([0, 1, 0, 1, 0]));
+/// assert_eq!(filter.map().vertices().len(), 2);
+/// assert!(filter.path().map(u8::from).eq([0, 1, 0, 1, 0]));
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 #[derive(Clone, Debug)]
@@ -156,7 +156,7 @@ impl<const N: usize, const V: usize, const HISTORY: usize> RobustFilter<N, V, HI
         self.draft.know(map, f32::from(config.noise_mm) / f32::from(Fingerprint::STEP_MM));
         self.draft.recount(&self.prices, &self.record);
         self.beam.begin_with(&self.draft);
-        self.names.begin_with(map.vertices());
+        self.names.begin_with(map.vertices().len() as u8);
         self.map = *map;
         Ok(())
     }
@@ -344,15 +344,15 @@ impl<const N: usize, const V: usize, const HISTORY: usize> RobustFilter<N, V, HI
     /// Replaces all hypotheses by one that takes the newest places for given vertices, numbered from 0 without gaps, the
     /// oldest first; tells its score. It is for tests and evaluations: to force a mistake, or to begin a search at the truth.
     /// Nothing happens when there are not as many vertices as places, or more vertices than a map holds.
-    pub fn assume_path(&mut self, path: &[u8]) -> Option<f32> {
-        let vertices = path.iter().max().map_or(0, |last| last.saturating_add(1));
-        if path.len() != self.record.len() || usize::from(vertices) > V {
+    pub fn assume_path(&mut self, path: &[VertexId]) -> Option<f32> {
+        let vertices = path.iter().max().map_or(0, |last| last.index() + 1);
+        if path.len() != self.record.len() || vertices > V {
             return None;
         }
         self.draft.clear();
-        self.draft.vertices = vertices;
+        self.draft.vertices = vertices as u8;
         for (slot, &vertex) in self.draft.path.iter_mut().zip(path) {
-            *slot = vertex;
+            *slot = vertex.into();
         }
         self.draft.rebuild(&self.prices, &self.record);
         self.beam.begin_with(&self.draft);

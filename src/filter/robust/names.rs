@@ -2,7 +2,7 @@
 
 use super::hypothesis::{Hypothesis, NOWHERE};
 use super::record::Record;
-use crate::Map;
+use crate::{Map, VertexId};
 
 /// The published numbers: 2 bytes a vertex and one a place.
 #[derive(Clone, Debug)]
@@ -58,13 +58,13 @@ impl<const V: usize, const T: usize> Names<V, T> {
         self.names.get(usize::from(vertex)).copied().unwrap_or(0)
     }
 
-    pub(super) fn path(&self) -> &[u8] {
+    pub(super) fn path(&self) -> &[u8; T] {
         &self.path
     }
 
-    pub(super) fn renamed(&self, before: u8) -> Option<u8> {
+    pub(super) fn renamed(&self, before: VertexId) -> Option<VertexId> {
         let known = self.renamed.get(..usize::from(self.vertices))?;
-        known.get(usize::from(before)).copied().filter(|&now| now != NOWHERE)
+        VertexId::new(*known.get(before.index())?)
     }
 
     /// Numbers the vertices of a hypothesis: those that most of the visits of a published vertex belong to keep its number,
@@ -79,7 +79,7 @@ impl<const V: usize, const T: usize> Names<V, T> {
                 *count = count.saturating_add(1);
             }
         }
-        self.vertices = map.vertices();
+        self.vertices = map.vertices().len() as u8;
         self.names = [NOWHERE; V];
         let mut taken = 0_u64;
         while let Some((vertex, name)) = self.most_shared(&shared, map, best, taken) {
@@ -126,7 +126,7 @@ impl<const V: usize, const T: usize> Names<V, T> {
             if self.names.get(usize::from(vertex)).is_some_and(|&name| name != NOWHERE) {
                 continue;
             }
-            for (name, &count) in (0..best.vertices.min(map.vertices())).zip(row) {
+            for (name, &count) in (0..best.vertices.min(map.vertices().len() as u8)).zip(row) {
                 if count > 0 && taken >> (name & 63) & 1 == 0 && most.is_none_or(|(largest, ..)| count > largest) {
                     most = Some((count, vertex, name));
                 }
@@ -142,10 +142,11 @@ impl<const V: usize, const T: usize> Names<V, T> {
             if is_named || row.iter().any(|&count| count > 0) || best.tally(vertex).visits < 2 {
                 continue;
             }
-            for name in
-                (0..best.vertices.min(map.vertices())).filter(|&name| taken >> (name & 63) & 1 == 0 && is_idle(name))
+            for name in (0..best.vertices.min(map.vertices().len() as u8))
+                .filter(|&name| taken >> (name & 63) & 1 == 0 && is_idle(name))
             {
-                let label = map.label(name).map_or(0.0, |label| f32::from(label.steps()));
+                let label =
+                    VertexId::new(name).and_then(|name| map.label(name)).map_or(0.0, |label| f32::from(label.steps()));
                 let off = (best.tally(vertex).mean() - label).abs();
                 if nearest.is_none_or(|(least, ..)| off < least) {
                     nearest = Some((off, vertex, name));
@@ -157,7 +158,7 @@ impl<const V: usize, const T: usize> Names<V, T> {
 
     /// A published vertex without visits in the record is renamed only if a vertex of its number goes on.
     fn settle_unvisited(&mut self, map: &Map<V>, best: &Hypothesis<V, T>) {
-        for before in 0..map.vertices() {
+        for before in 0..map.vertices().len() as u8 {
             let goes_on = self.names.iter().take(usize::from(best.vertices)).any(|&name| name == before);
             if let Some(renamed) = self.renamed.get_mut(usize::from(before))
                 && *renamed == NOWHERE

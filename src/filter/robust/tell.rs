@@ -3,7 +3,7 @@
 use super::{RobustFilter, worst};
 use crate::filter::{RobustFactors, Update, WeightFactors, WorstNgram};
 use crate::map::bits;
-use crate::{Fingerprint, Map};
+use crate::{Fingerprint, Map, VertexId};
 
 /// One in the unit of probabilities.
 const ONE_Q16: f32 = 65536.0;
@@ -34,7 +34,9 @@ impl<const N: usize, const V: usize, const HISTORY: usize> RobustFilter<N, V, HI
         for vertex in 0..best.vertices {
             let name = self.names.name(vertex);
             for neighbour in bits(best.row(vertex).into()) {
-                self.map.add_edge(name, self.names.name(neighbour));
+                if let (Some(a), Some(b)) = (VertexId::new(name), VertexId::new(self.names.name(neighbour))) {
+                    self.map.add_edge(a, b);
+                }
             }
             let probability = self.forward.belief.get(usize::from(vertex)).copied().unwrap_or(0.0);
             if let Some(belief) = self.belief_q16.get_mut(usize::from(name)) {
@@ -58,7 +60,7 @@ impl<const N: usize, const V: usize, const HISTORY: usize> RobustFilter<N, V, HI
         let factors = best.factors(&self.prices);
         Update {
             place_index: self.observed.wrapping_sub(1),
-            vertex: self.names.name(best.place),
+            vertex: VertexId::new(self.names.name(best.place)).unwrap_or(VertexId::FIRST),
             is_new: best.tally(best.place).visits == 1,
             consistency_mm: self.worst.distance_mm,
             factors: WeightFactors::Robust(RobustFactors {
@@ -79,19 +81,19 @@ impl<const N: usize, const V: usize, const HISTORY: usize> RobustFilter<N, V, HI
 
     /// The vertex that each of the newest `HISTORY` places was taken for, the oldest first, as the best hypothesis saw the
     /// past at the last update.
-    pub fn path(&self) -> impl Iterator<Item = u8> + '_ {
-        self.names.path().iter().copied().take(self.record.len())
+    pub fn path(&self) -> impl Iterator<Item = VertexId> + '_ {
+        self.names.path().iter().filter_map(|&vertex| VertexId::new(vertex)).take(self.record.len())
     }
 
     /// The vertex of a place on that path, so many places ago, 0 for the newest.
-    pub fn recent(&self, ago: usize) -> Option<u8> {
+    pub fn recent(&self, ago: usize) -> Option<VertexId> {
         let index = self.record.len().checked_sub(ago)?.checked_sub(1)?;
-        self.names.path().get(index).copied()
+        VertexId::new(*self.names.path().get(index)?)
     }
 
     /// The probability that the robot is at a vertex of the best map, given that map, in units of 2⁻¹⁶.
-    pub fn place_probability_q16(&self, vertex: u8) -> u32 {
-        self.belief_q16.get(usize::from(vertex)).copied().unwrap_or(0)
+    pub fn place_probability_q16(&self, vertex: VertexId) -> u32 {
+        self.belief_q16.get(vertex.index()).copied().unwrap_or(0)
     }
 
     /// The probability that the best map is right, were one of the hypotheses right, in units of 2⁻¹⁶.
@@ -101,7 +103,7 @@ impl<const N: usize, const V: usize, const HISTORY: usize> RobustFilter<N, V, HI
 
     /// For each vertex before the last update its number now; `None` when it is gone. A vertex that was merged into
     /// another has the number of the other.
-    pub fn renamed(&self, before: u8) -> Option<u8> {
+    pub fn renamed(&self, before: VertexId) -> Option<VertexId> {
         self.names.renamed(before)
     }
 

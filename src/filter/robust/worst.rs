@@ -5,8 +5,8 @@
 
 use super::record::Record;
 use crate::filter::WorstNgram;
-use crate::map::bits;
-use crate::{Fingerprint, Map};
+use crate::map::PerVertex;
+use crate::{Fingerprint, Map, VertexId};
 
 /// n: how many labels an n-gram has, as in Section IV of the paper.
 pub(in crate::filter) const LENGTH: usize = 5;
@@ -21,7 +21,9 @@ pub(super) fn worst_ngram<const V: usize, const T: usize>(record: &Record<T>, ma
     // How far the path is from each n-gram, by the place of its newest label: first of that label alone.
     let mut bounds = [0_u16; T];
     for ((entry, &vertex), bound) in record.iter().zip(path).zip(&mut bounds) {
-        *bound = map.label(vertex).map_or(0, |label| entry.steps.abs_diff(label.steps()));
+        *bound = VertexId::new(vertex)
+            .and_then(|vertex| map.label(vertex))
+            .map_or(0, |label| entry.steps.abs_diff(label.steps()));
     }
     for end in (LENGTH - 1..record.len()).rev() {
         let largest = bounds.get(end + 1 - LENGTH..=end).and_then(|bounds| bounds.iter().max()).copied();
@@ -61,34 +63,34 @@ pub(super) fn worst_ngram<const V: usize, const T: usize>(record: &Record<T>, ma
 
 /// The walk of the map that is nearest to an n-gram in the maximum norm (Eq. 3), and its distance in steps.
 #[inline(never)]
-fn nearest_walk<const V: usize>(map: &Map<V>, labels: &[u16; LENGTH]) -> (u16, [u8; LENGTH]) {
-    let mut distances = [0_u16; V];
-    let mut backs = [[0_u8; V]; LENGTH];
+fn nearest_walk<const V: usize>(map: &Map<V>, labels: &[u16; LENGTH]) -> (u16, [VertexId; LENGTH]) {
+    let mut distances = PerVertex::<u16, V>::filled(0);
+    let mut backs = [PerVertex::<VertexId, V>::filled(VertexId::FIRST); LENGTH];
     for (index, (&label, backs)) in labels.iter().zip(&mut backs).enumerate() {
-        let mut next = [u16::MAX; V];
-        for (((vertex, own), next), back) in (0_u8..).zip(map.labels()).zip(&mut next).zip(backs) {
+        let mut next = PerVertex::filled(u16::MAX);
+        for (vertex, own) in map.vertices().zip(map.labels()) {
             let mut arrival = (u16::MAX, vertex);
             if index == 0 {
                 arrival.0 = 0;
             } else {
-                for from in bits(map.neighbours(vertex)) {
-                    let distance = distances.get(usize::from(from)).copied().unwrap_or(u16::MAX);
-                    if distance < arrival.0 {
-                        arrival = (distance, from);
+                for from in map.neighbours(vertex).iter() {
+                    if distances[from] < arrival.0 {
+                        arrival = (distances[from], from);
                     }
                 }
             }
-            *next = arrival.0.max(own.steps().abs_diff(label));
-            *back = arrival.1;
+            next[vertex] = arrival.0.max(own.steps().abs_diff(label));
+            backs[vertex] = arrival.1;
         }
         distances = next;
     }
-    let best = (0_u8..map.vertices()).zip(distances).min_by_key(|&(_, distance)| distance).unwrap_or((0, 0));
-    let mut walk = [0; LENGTH];
-    let mut vertex = best.0;
+    let end = map.vertices().min_by_key(|&vertex| distances[vertex]);
+    let distance = end.map_or(0, |end| distances[end]);
+    let mut vertex = end.unwrap_or(VertexId::FIRST);
+    let mut walk = [vertex; LENGTH];
     for (slot, backs) in walk.iter_mut().zip(&backs).rev() {
         *slot = vertex;
-        vertex = backs.get(usize::from(vertex)).copied().unwrap_or(0);
+        vertex = backs[vertex];
     }
-    (best.1, walk)
+    (distance, walk)
 }

@@ -1,7 +1,7 @@
 //! A replica of the robot's map, built from its messages.
 
-use crate::FaultKind;
-use crate::map::bits;
+use crate::{FaultKind, VertexSet};
+
 use crate::wire::decoder::{Arrival, Header};
 use crate::wire::digest::rows_digest;
 use crate::wire::robot::bit;
@@ -119,7 +119,9 @@ impl<const V: usize> MapReplica<V> {
 
     /// Every edge once, as pairs of vertices with the smaller id first.
     pub fn edges(&self) -> impl Iterator<Item = (u8, u8)> + '_ {
-        (0..self.vertices).flat_map(move |a| bits(self.neighbours(a)).filter(move |&b| a <= b).map(move |b| (a, b)))
+        let later = |a, &b: &u8| a <= b;
+        let neighbours = |a| VertexSet::from_bits(self.neighbours(a)).iter().map(u8::from);
+        (0..self.vertices).flat_map(move |a| neighbours(a).filter(move |b| later(a, b)).map(move |b| (a, b)))
     }
 
     /// The last `Hello`.

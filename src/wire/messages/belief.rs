@@ -3,9 +3,8 @@
 use serde::{Deserialize, Serialize};
 
 use super::List;
-use crate::Filter;
-use crate::map::bits;
 use crate::wire::robot::bit;
+use crate::{Filter, VertexId, VertexSet};
 
 /// The belief of the filter after a place: where the robot may be, and how probable the map is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -31,8 +30,9 @@ impl Belief {
     /// The belief of a filter after a place. Cost: O(8 · V).
     pub fn of<const V: usize>(filter: &impl Filter<V>, place_index: u32) -> Self {
         let mut most_probable = [VertexProbability::default(); 8];
-        for vertex in 0..filter.map().vertices() {
-            let mut candidate = VertexProbability { vertex, permille: permille(filter.place_probability_q16(vertex)) };
+        for vertex in filter.map().vertices() {
+            let permille = permille(filter.place_probability_q16(vertex));
+            let mut candidate = VertexProbability { vertex: vertex.into(), permille };
             for slot in &mut most_probable {
                 if candidate.permille > slot.permille {
                     core::mem::swap(slot, &mut candidate);
@@ -78,8 +78,10 @@ impl Remapped {
 
     /// The id changes of a filter's last update among the first `vertices` ids; `None` if no id changed.
     pub fn of<const V: usize>(filter: &impl Filter<V>, vertices: u8, place_index: u32) -> Option<Self> {
-        let last_changed = (0..vertices).rev().find(|&vertex| filter.renamed(vertex) != Some(vertex))?;
-        let new_ids = (0..=last_changed).map(|vertex| filter.renamed(vertex).unwrap_or(Self::REMOVED));
+        let mut before = VertexId::first(vertices.into());
+        let last_changed = before.rfind(|&vertex| filter.renamed(vertex) != Some(vertex))?;
+        let new_id = |vertex| filter.renamed(vertex).map_or(Self::REMOVED, u8::from);
+        let new_ids = VertexId::first(last_changed.index() + 1).map(new_id);
         Some(Self { place_index, vertices: List::new(new_ids) })
     }
 
@@ -107,7 +109,10 @@ impl Remapped {
         for ((before, label), row) in (0..).zip(labels_before).zip(neighbours_before) {
             let Some(now) = self.now(before) else { continue };
             let Some(slot) = neighbours.get_mut(usize::from(now)) else { continue };
-            let neighbours_now = bits(row).filter_map(|other| self.now(other)).filter(|&now| usize::from(now) < V);
+            let neighbours_now = VertexSet::from_bits(row)
+                .iter()
+                .filter_map(|other| self.now(other.into()))
+                .filter(|&now| usize::from(now) < V);
             *slot |= neighbours_now.fold(0, |row, other| row | bit(other));
             if labelled & bit(before) != 0
                 && labelled_now & bit(now) == 0
@@ -143,7 +148,7 @@ impl Worst {
     /// The worst n-gram of a filter after a place.
     pub fn of<const V: usize>(filter: &impl Filter<V>, place_index: u32) -> Self {
         let worst = filter.worst();
-        let vertices = List::new(worst.walk().iter().copied());
+        let vertices = List::new(worst.walk().iter().map(|&vertex| vertex.into()));
         Self { place_index, distance_mm: worst.distance_mm, newest_age: worst.newest_age, vertices }
     }
 

@@ -203,7 +203,7 @@ impl Location {
 
 impl From<&Update> for Location {
     fn from(update: &Update) -> Self {
-        Self { place_index: update.place_index, vertex: update.vertex }
+        Self { place_index: update.place_index, vertex: update.vertex.into() }
     }
 }
 

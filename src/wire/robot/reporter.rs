@@ -161,7 +161,7 @@ impl<const V: usize> Reporter<V> {
     ) {
         let map = filter.map();
         let remapped = Remapped::of(filter, self.vertices_before, update.place_index);
-        self.vertices_before = map.vertices();
+        self.vertices_before = map.vertices().len() as u8;
         let mut changed = false;
         // If the queue refuses it, the listener keeps the old ids, and so does the record of what was sent; the messages
         // below send the difference.
@@ -172,16 +172,17 @@ impl<const V: usize> Reporter<V> {
             self.note_remapped(&remapped);
         }
         let sent_vertices = self.vertices;
-        if map.vertices() < sent_vertices {
-            self.forget_from(map.vertices());
+        let vertices = map.vertices().len() as u8;
+        if vertices < sent_vertices {
+            self.forget_from(vertices);
         }
-        changed |= map.vertices() != sent_vertices;
-        for vertex in 0..map.vertices() {
+        changed |= vertices != sent_vertices;
+        for vertex in map.vertices() {
             let row = row_of(map, vertex);
             if self.flips(&row).count_ones() > 1 {
                 changed = true;
                 self.send_row(row, &mut send);
-            } else if self.sent_label(vertex) != Some((row.radius_mm, row.visits)) {
+            } else if self.sent_label(row.vertex) != Some((row.radius_mm, row.visits)) {
                 changed = true;
                 let Row { vertex, radius_mm, visits, .. } = row;
                 if self.send(&Message::Vertex { vertex, radius_mm, visits }, &mut send) {
@@ -189,13 +190,13 @@ impl<const V: usize> Reporter<V> {
                 }
             }
         }
-        for a in 0..map.vertices() {
-            let flips = self.flips(&row_of(map, a));
+        for row in map.vertices().map(|vertex| row_of(map, vertex)) {
+            let flips = self.flips(&row);
             changed |= flips != 0;
             // More than one: the queue refused the row, and the repeated map will send it.
             if flips.count_ones() == 1 {
-                let b = flips.trailing_zeros() as u8;
-                let present = map.neighbours(a) & flips != 0;
+                let (a, b) = (row.vertex, flips.trailing_zeros() as u8);
+                let present = row.neighbours & flips != 0;
                 if self.send(&Message::Edge { a, b, present }, &mut send) {
                     self.note_edge(a, b, present);
                 }
@@ -254,9 +255,10 @@ impl<const V: usize> Reporter<V> {
         faults: &FaultCounters,
         send: &mut impl FnMut(&Message) -> Result<(), QueueFull>,
     ) -> bool {
-        let vertices = map.vertices();
+        let vertices = map.vertices().len() as u8;
+        let piece = map.vertices().nth(self.turn.into());
         let done = match self.turn.checked_sub(vertices) {
-            None => self.send_row(row_of(map, self.turn), send),
+            None => piece.is_none_or(|vertex| self.send_row(row_of(map, vertex), send)),
             Some(0) => self.send_size(map, send),
             Some(1) => self.location.is_none_or(|location| self.send(&Message::Location(location), send)),
             Some(2) => self.belief.is_none_or(|belief| self.send(&Message::Belief(belief), send)),
@@ -288,10 +290,10 @@ impl<const V: usize> Reporter<V> {
     }
 
     fn send_size(&mut self, map: &Map<V>, send: &mut impl FnMut(&Message) -> Result<(), QueueFull>) -> bool {
-        let edges = map.edges().count() as u16;
-        let taken = self.send(&Message::Map { vertices: map.vertices(), edges, digest: map_digest(map) }, send);
+        let (vertices, edges) = (map.vertices().len() as u8, map.edges().count() as u16);
+        let taken = self.send(&Message::Map { vertices, edges, digest: map_digest(map) }, send);
         if taken {
-            self.vertices = map.vertices();
+            self.vertices = vertices;
         }
         taken
     }

@@ -65,7 +65,7 @@ impl DriveArguments {
         println!("{}", journal.report());
         let nodes: Vec<Option<usize>> = detections.iter().map(|detection| detection.node).collect();
         let score = score_path(map, path, truth, &nodes);
-        let (vertices, edges) = (map.vertices(), map.edges().count());
+        let (vertices, edges) = (map.vertices().len(), map.edges().count());
         println!("map: {vertices} vertices, {edges} edges, digest {:08x}", map_digest(map));
         println!(
             "against the true map: exact {}, isomorphic {}, edge F1 {:.2}, located in {:.0} % of the places",

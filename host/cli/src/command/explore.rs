@@ -128,10 +128,10 @@ fn one(arguments: &Arguments, plan: &Plan, noise: f64, seed: u64) -> anyhow::Res
 fn travel(exploration: &mut Exploration<'_>, journeys: u64, seed: u64) -> Journeys {
     let mut outcome = Journeys::default();
     for number in 0..journeys {
-        let vertices = exploration.robot().mapper().map().vertices();
-        let here = exploration.steps().last().map(|step| step.update.vertex);
+        let vertices = exploration.robot().mapper().map().vertices().len() as u64;
+        let here = exploration.steps().last().map(|step| u8::from(step.update.vertex));
         // Any other vertex, by the seed.
-        let vertex = ((seed + 7 * number) % u64::from(vertices.max(1))) as u8;
+        let vertex = ((seed + 7 * number) % vertices.max(1)) as u8;
         if Some(vertex) == here {
             continue;
         }

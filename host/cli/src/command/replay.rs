@@ -73,13 +73,13 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
 }
 
 fn print_map<const V: usize>(map: &Map<V>) {
-    let edges: Vec<(u8, u8)> = map.edges().collect();
-    println!("map: {} vertices, {} edges", map.vertices(), edges.len());
-    for (vertex, label) in (0..map.vertices()).zip(map.labels()) {
+    let edges: Vec<_> = map.edges().collect();
+    println!("map: {} vertices, {} edges", map.vertices().len(), edges.len());
+    for (vertex, label) in map.vertices().zip(map.labels()) {
         println!("  vertex {vertex:2}: radius {:4} mm, {} visits", label.radius_mm(), map.visits(vertex));
     }
     let texts: Vec<String> = edges.iter().map(|(a, b)| format!("{a}-{b}")).collect();
     println!("  edges: {}", texts.join(" "));
-    let graph = Graph::from_edges(map.vertices().into(), edges.iter().map(|&(a, b)| (a.into(), b.into())));
+    let graph = Graph::from_edges(map.vertices().len(), edges.iter().map(|&(a, b)| (a.into(), b.into())));
     println!("  the map is {}", Shape::of(&graph));
 }

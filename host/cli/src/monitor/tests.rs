@@ -76,7 +76,7 @@ fn office(places: usize) -> (Watch, Vec<(u8, u8)>, Vec<u16>) {
     }
     let map = exploration.robot().mapper().map();
     let radii = map.labels().iter().map(|label| label.radius_mm()).collect();
-    (watch, map.edges().collect(), radii)
+    (watch, map.edges().map(|(a, b)| (a.into(), b.into())).collect(), radii)
 }
 
 fn hello() -> Hello {

@@ -43,8 +43,8 @@ impl Drawing {
         detections: &[Detection],
         caption: String,
     ) -> Self {
-        let vertices = (0..map.vertices()).zip(map.labels()).map(|(vertex, label)| {
-            let visits = path.iter().zip(detections).filter(|&(&visited, _)| visited == Some(usize::from(vertex)));
+        let vertices = map.vertices().zip(map.labels()).map(|(vertex, label)| {
+            let visits = path.iter().zip(detections).filter(|&(&visited, _)| visited == Some(vertex.index()));
             Vertex {
                 position: mostly_at(&visits.map(|(_, detection)| *detection).collect::<Vec<_>>()),
                 radius_mm: label.radius_mm().into(),

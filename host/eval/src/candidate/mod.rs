@@ -10,7 +10,7 @@ use super::{
     settings::{EvaluationError, Filter, Settings},
     trial::Trial,
 };
-use toposlam::{ConfigError, Map, NgramLength, Observation};
+use toposlam::{ConfigError, Map, NgramLength, Observation, VertexId};
 
 /// How many vertices a map can have: what a row of the adjacency matrix holds. Faults count the maps that were full.
 pub const VERTICES: usize = 64;
@@ -27,7 +27,7 @@ pub trait Candidate {
     fn polish(&mut self, slices: u32);
     /// Where a search of so many slices ends that starts at a path, given as a vertex for each place so far: map and path.
     /// `None` for a filter that does not search.
-    fn search_from(&self, path: &[u8], slices: u32) -> Option<(Map<VERTICES>, Vec<usize>)>;
+    fn search_from(&self, path: &[VertexId], slices: u32) -> Option<(Map<VERTICES>, Vec<usize>)>;
     /// The best map.
     fn map(&self) -> Map<VERTICES>;
     /// The vertex of the best map that each of the newest `places` places is taken for, the oldest first.

@@ -8,7 +8,7 @@ use crate::{
     trial::Trial,
 };
 use std::ptr;
-use toposlam::{Config, FaultKind, Fingerprint, Map, Observation, PaperFilter, Prior};
+use toposlam::{Config, FaultKind, Fingerprint, Map, Observation, PaperFilter, Prior, VertexId};
 
 /// How many places a path can visit without a prior.
 pub(super) const MAX_PLACES: usize = 2048;
@@ -55,7 +55,7 @@ impl<const N: usize, const WORDS: usize> Particles<N, WORDS> {
 
     fn advance(&mut self) {
         let particles = self.filter.particles().iter();
-        self.ancestry.advance(particles.map(|particle| (particle.parent.into(), particle.place.into())));
+        self.ancestry.advance(particles.map(|particle| (particle.parent.into(), particle.at.into())));
     }
 
     /// The newest vertices that the best particle visited.
@@ -84,7 +84,7 @@ impl<const N: usize, const WORDS: usize> Candidate for Online<N, WORDS> {
 
     fn polish(&mut self, _slices: u32) {}
 
-    fn search_from(&self, _path: &[u8], _slices: u32) -> Option<(Map<VERTICES>, Vec<usize>)> {
+    fn search_from(&self, _path: &[VertexId], _slices: u32) -> Option<(Map<VERTICES>, Vec<usize>)> {
         None
     }
 
@@ -121,7 +121,7 @@ impl<const N: usize, const WORDS: usize> Candidate for Informed<N, WORDS> {
 
     fn polish(&mut self, _slices: u32) {}
 
-    fn search_from(&self, _path: &[u8], _slices: u32) -> Option<(Map<VERTICES>, Vec<usize>)> {
+    fn search_from(&self, _path: &[VertexId], _slices: u32) -> Option<(Map<VERTICES>, Vec<usize>)> {
         None
     }
 

@@ -5,7 +5,7 @@ use crate::{
     settings::{EvaluationError, Filter, Settings},
     trial::Trial,
 };
-use toposlam::{FaultKind, Fingerprint, Map, Observation, RobustConfig, RobustFilter};
+use toposlam::{FaultKind, Fingerprint, Map, Observation, RobustConfig, RobustFilter, VertexId};
 
 /// How many vertices a map of the robust filter can have.
 const ROBUST_VERTICES: usize = 32;
@@ -54,7 +54,7 @@ impl<const N: usize, const HISTORY: usize> Candidate for Robust<N, HISTORY> {
         (0..slices).for_each(|_| self.0.polish());
     }
 
-    fn search_from(&self, path: &[u8], slices: u32) -> Option<(Map<VERTICES>, Vec<usize>)> {
+    fn search_from(&self, path: &[VertexId], slices: u32) -> Option<(Map<VERTICES>, Vec<usize>)> {
         let mut search = Self(self.0.clone());
         search.0.assume_path(path)?;
         search.polish(slices);

@@ -138,7 +138,7 @@ impl Soak {
         for turn in 0..self.turns {
             let frame = exploration.frame();
             let frame = ring.disturb(frame, exploration.ring_faults());
-            let told = operator.turn(turn, exploration.robot().mapper().map().vertices());
+            let told = operator.turn(turn, exploration.robot().mapper().map().vertices().len() as u8);
             let mut arriving = lines[0].carry(&told);
             arriving.extend(lines[0].noise());
             auditor.arrive(&arriving);

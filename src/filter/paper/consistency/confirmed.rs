@@ -5,7 +5,8 @@
 //! vertex only those with minimal sets of states matter: what meets a set meets all that it lies within.
 
 use super::{Consistency, evidence::Evidence, readings::Readings, state_set::StateSet, witness::Walk};
-use crate::{Map, NgramLength, map::bits};
+use crate::map::PerVertex;
+use crate::{Map, NgramLength, VertexId, VertexSet};
 
 /// How many arms are held at once; more are taken in blocks.
 const BLOCK: usize = 14;
@@ -18,14 +19,17 @@ const TAILS: usize = 6;
 struct Arm<const WORDS: usize> {
     states: StateSet<WORDS>,
     /// The vertices, that of the last label first.
-    path: [u8; LONGEST_ARM],
+    path: [VertexId; LONGEST_ARM],
 }
+
+/// Fills up the path of a shorter arm.
+const NONE: VertexId = VertexId::FIRST;
 
 /// The vertices of the longest arm.
 const LONGEST_ARM: usize = NgramLength::MAX.get().div_ceil(2) as usize;
 
 impl<const WORDS: usize> Arm<WORDS> {
-    const NONE: Self = Self { states: StateSet::EMPTY, path: [0; LONGEST_ARM] };
+    const NONE: Self = Self { states: StateSet::EMPTY, path: [NONE; LONGEST_ARM] };
 
     /// Adds this arm to a list of arms with minimal states, unless one of them has its states within those of this one;
     /// those that have these states within theirs leave. The number of arms in the list is returned, or `None` when
@@ -53,13 +57,13 @@ impl<const WORDS: usize> Arm<WORDS> {
 pub(super) struct Arms<const V: usize, const WORDS: usize> {
     block: [Arm<WORDS>; BLOCK],
     /// For each vertex, where the readings of a tail that ends there may go on to: the minimal ones.
-    tails: [[Arm<WORDS>; TAILS]; V],
+    tails: PerVertex<[Arm<WORDS>; TAILS], V>,
     /// For each vertex, the tails it has: bits of kept ones, [`UNREAD`], or [`TOO_MANY`].
-    kept: [u8; V],
+    kept: PerVertex<u8, V>,
     /// For each vertex, where the reading of its label alone may go on to.
-    ahead: [StateSet<WORDS>; V],
+    ahead: PerVertex<StateSet<WORDS>, V>,
     /// The vertices whose `ahead` was read.
-    is_ahead: u64,
+    is_ahead: VertexSet,
 }
 
 /// The tails of a vertex were not asked for yet.
@@ -71,10 +75,10 @@ impl<const V: usize, const WORDS: usize> Arms<V, WORDS> {
     pub(super) const fn new() -> Self {
         Self {
             block: [Arm::NONE; BLOCK],
-            tails: [[Arm::NONE; TAILS]; V],
-            kept: [UNREAD; V],
-            ahead: [StateSet::EMPTY; V],
-            is_ahead: 0,
+            tails: PerVertex::filled([Arm::NONE; TAILS]),
+            kept: PerVertex::filled(UNREAD),
+            ahead: PerVertex::filled(StateSet::EMPTY),
+            is_ahead: VertexSet::EMPTY,
         }
     }
 }
@@ -95,10 +99,10 @@ impl<const V: usize, const WORDS: usize, const INDICES: usize> Consistency<V, WO
         if witnesses.refute_walks(map, evidence, length, distance, readings) {
             return false;
         }
-        kept.fill(UNREAD);
-        *is_ahead = 0;
+        *kept = PerVertex::filled(UNREAD);
+        *is_ahead = VertexSet::EMPTY;
         let mut question = Question { map, evidence, length, distance, readings, tails, kept, ahead, is_ahead };
-        for vertex in 0..map.vertices() {
+        for vertex in map.vertices() {
             if let Err(walk) = question.confirm_at(vertex, block) {
                 witnesses.remember_walk(walk);
                 return false;
@@ -115,19 +119,19 @@ struct Question<'a, E, const V: usize, const WORDS: usize, const INDICES: usize>
     length: NgramLength,
     distance: u16,
     readings: &'a mut Readings<V, WORDS, INDICES>,
-    tails: &'a mut [[Arm<WORDS>; TAILS]; V],
-    kept: &'a mut [u8; V],
-    ahead: &'a mut [StateSet<WORDS>; V],
-    is_ahead: &'a mut u64,
+    tails: &'a mut PerVertex<[Arm<WORDS>; TAILS], V>,
+    kept: &'a mut PerVertex<u8, V>,
+    ahead: &'a mut PerVertex<StateSet<WORDS>, V>,
+    is_ahead: &'a mut VertexSet,
 }
 
 impl<E: Evidence<WORDS>, const V: usize, const WORDS: usize, const INDICES: usize> Question<'_, E, V, WORDS, INDICES> {
     /// Whether all walks whose middle is a vertex, or an edge from it to a vertex of no smaller number, are confirmed; if
     /// not, one that is not.
-    fn confirm_at(&mut self, vertex: u8, block: &mut [Arm<WORDS>; BLOCK]) -> Result<(), Walk> {
-        let mut onward = bits(self.map.neighbours(vertex) >> vertex << vertex);
+    fn confirm_at(&mut self, vertex: VertexId, block: &mut [Arm<WORDS>; BLOCK]) -> Result<(), Walk> {
+        let mut onward = (self.map.neighbours(vertex) - VertexSet::first(vertex.index())).iter();
         if self.length == NgramLength::MIN {
-            let arm = |states, vertex| Arm { states, path: [vertex, 0, 0, 0] };
+            let arm = |states, vertex| Arm { states, path: [vertex, NONE, NONE, NONE] };
             let first = arm(*self.reading(vertex, 0), vertex);
             return onward.try_for_each(|neighbour| {
                 let second = arm(*self.reading(neighbour, 0), neighbour);
@@ -168,7 +172,7 @@ impl<E: Evidence<WORDS>, const V: usize, const WORDS: usize, const INDICES: usiz
         let arm_vertices = usize::from(self.length.get().div_ceil(2));
         let shared = usize::from(self.length.get() % 2);
         let there = first.path.iter().take(arm_vertices).rev();
-        let mut walk = [0; 7];
+        let mut walk = [NONE; 7];
         for (slot, &vertex) in walk.iter_mut().zip(there.chain(second.path.iter().take(arm_vertices).skip(shared))) {
             *slot = vertex;
         }
@@ -184,24 +188,30 @@ impl<E: Evidence<WORDS>, const V: usize, const WORDS: usize, const INDICES: usiz
     }
 
     /// The ways from the middle of a walk to where the tails of its arms begin.
-    fn ways(&self, middle: u8) -> Ways {
+    fn ways(&self, middle: VertexId) -> Ways {
         let vertices = if self.length.get() > 6 { 3 } else { 2 };
-        Ways { path: [middle, 0, 0], waiting: [0, self.map.neighbours(middle), 0], vertices, tails: 0 }
+        Ways {
+            path: [middle, NONE, NONE],
+            waiting: [VertexSet::EMPTY, self.map.neighbours(middle), VertexSet::EMPTY],
+            vertices,
+            tails: VertexSet::EMPTY,
+        }
     }
 
     /// The next arm, read from its far end to the middle of the walk.
     fn next_arm(&mut self, ways: &mut Ways) -> Option<Arm<WORDS>> {
-        while ways.tails == 0 {
+        let number = loop {
+            if let Some(number) = ways.tails.pop_first() {
+                break number;
+            }
             let end = ways.next(self.map)?;
             ways.tails = self.tails_at(end);
-        }
-        let number = ways.tails.trailing_zeros() as u8;
-        ways.tails &= ways.tails - 1;
+        };
         let [middle, between, far] = ways.path;
         if ways.vertices == 2 {
             let Arm { states, path: [end, begin, ..] } = self.tail(between, number);
             let states = states.intersection(self.reading(middle, self.tail_labels()));
-            return Some(Arm { states, path: [middle, end, begin, 0] });
+            return Some(Arm { states, path: [middle, end, begin, NONE] });
         }
         let Arm { states, path: [end, begin, ..] } = self.tail(far, number);
         let states = states.intersection(self.reading(between, self.tail_labels()));
@@ -214,40 +224,36 @@ impl<E: Evidence<WORDS>, const V: usize, const WORDS: usize, const INDICES: usiz
         if self.length.get() > 4 { 2 } else { 1 }
     }
 
-    /// The tails of a vertex, as a row of numbers for [`Question::tail`].
-    fn tails_at(&mut self, vertex: u8) -> u64 {
-        let slot = usize::from(vertex);
-        let row = if self.tail_labels() == 1 { 1 } else { self.map.neighbours(vertex) };
-        if self.kept.get(slot) == Some(&UNREAD) {
+    /// The tails of a vertex, as a set of numbers for [`Question::tail`].
+    fn tails_at(&mut self, vertex: VertexId) -> VertexSet {
+        let all = if self.tail_labels() == 1 { VertexSet::first(1) } else { self.map.neighbours(vertex) };
+        if self.kept[vertex] == UNREAD {
             let mut held = Some(0);
-            for number in bits(row) {
+            for number in all.iter() {
                 let tail = self.read_tail(vertex, number);
-                held = match (held, self.tails.get_mut(slot)) {
-                    (Some(held), Some(tails)) => tail.insert_minimal(tails, held),
-                    _ => break,
+                held = match held {
+                    Some(held) => tail.insert_minimal(&mut self.tails[vertex], held),
+                    None => break,
                 };
             }
-            if let Some(kept) = self.kept.get_mut(slot) {
-                *kept = held.map_or(TOO_MANY, |held| (1 << held) - 1);
-            }
+            self.kept[vertex] = held.map_or(TOO_MANY, |held| (1 << held) - 1);
         }
-        match self.kept.get(slot) {
-            Some(&kept) if kept != TOO_MANY => u64::from(kept),
-            _ => row,
+        match self.kept[vertex] {
+            TOO_MANY => all,
+            kept => VertexSet::from_bits(kept.into()),
         }
     }
 
-    fn tail(&mut self, vertex: u8, number: u8) -> Arm<WORDS> {
-        let slot = usize::from(vertex);
-        if self.kept.get(slot) == Some(&TOO_MANY) {
+    fn tail(&mut self, vertex: VertexId, number: VertexId) -> Arm<WORDS> {
+        if self.kept[vertex] == TOO_MANY {
             return self.read_tail(vertex, number);
         }
-        self.tails.get(slot).and_then(|tails| tails.get(usize::from(number))).copied().unwrap_or(Arm::NONE)
+        self.tails[vertex].get(number.index()).copied().unwrap_or(Arm::NONE)
     }
 
     /// Where the reading of a tail may go on to: a tail of two labels begins at the neighbour with a number.
-    fn read_tail(&mut self, vertex: u8, number: u8) -> Arm<WORDS> {
-        let path = [vertex, number, 0, 0];
+    fn read_tail(&mut self, vertex: VertexId, number: VertexId) -> Arm<WORDS> {
+        let path = [vertex, number, NONE, NONE];
         if self.tail_labels() == 1 {
             return Arm { states: self.ahead(vertex), path };
         }
@@ -256,19 +262,16 @@ impl<E: Evidence<WORDS>, const V: usize, const WORDS: usize, const INDICES: usiz
     }
 
     /// Where the reading of the label of one vertex may go on to.
-    fn ahead(&mut self, vertex: u8) -> StateSet<WORDS> {
-        let bit = 1 << (vertex & 63);
-        if *self.is_ahead & bit == 0 {
-            *self.is_ahead |= bit;
+    fn ahead(&mut self, vertex: VertexId) -> StateSet<WORDS> {
+        if !self.is_ahead.contains(vertex) {
+            self.is_ahead.insert(vertex);
             let states = *self.reading(vertex, 0);
-            if let Some(ahead) = self.ahead.get_mut(usize::from(vertex)) {
-                *ahead = self.evidence.around(&states);
-            }
+            self.ahead[vertex] = self.evidence.around(&states);
         }
-        self.ahead.get(usize::from(vertex)).copied().unwrap_or(StateSet::EMPTY)
+        self.ahead[vertex]
     }
 
-    fn reading(&mut self, vertex: u8, index: u8) -> &StateSet<WORDS> {
+    fn reading(&mut self, vertex: VertexId, index: u8) -> &StateSet<WORDS> {
         let label = (vertex, self.map.label_of(vertex));
         self.readings.at(self.evidence, self.length, label, index, self.distance)
     }
@@ -277,29 +280,26 @@ impl<E: Evidence<WORDS>, const V: usize, const WORDS: usize, const INDICES: usiz
 /// All walks of two or three vertices that start at a vertex, in a fixed order, and the tails at the end of the current.
 #[derive(Clone)]
 struct Ways {
-    path: [u8; 3],
-    /// For every vertex of the path but the first, its brothers that are still to come.
-    waiting: [u64; 3],
+    path: [VertexId; 3],
+    /// For every vertex of the path but the first, its siblings that are still to come.
+    waiting: [VertexSet; 3],
     vertices: u8,
     /// The tails at the end of the current walk that are still to come.
-    tails: u64,
+    tails: VertexSet,
 }
 
 impl Ways {
     /// Goes to the next walk; returns its last vertex.
-    fn next<const V: usize>(&mut self, map: &Map<V>) -> Option<u8> {
+    fn next<const V: usize>(&mut self, map: &Map<V>) -> Option<VertexId> {
         loop {
             let [_, first, second] = &mut self.waiting;
-            if self.vertices == 3 && *second != 0 {
-                self.path[2] = second.trailing_zeros() as u8;
-                *second &= *second - 1;
-                return Some(self.path[2]);
+            if self.vertices == 3
+                && let Some(third) = second.pop_first()
+            {
+                self.path[2] = third;
+                return Some(third);
             }
-            if *first == 0 {
-                return None;
-            }
-            self.path[1] = first.trailing_zeros() as u8;
-            *first &= *first - 1;
+            self.path[1] = first.pop_first()?;
             if self.vertices == 2 {
                 return Some(self.path[1]);
             }

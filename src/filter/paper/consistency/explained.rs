@@ -1,7 +1,7 @@
 //! From the evidence to the map: is every n-gram of the evidence near some walk of the map?
 
 use super::{Consistency, evidence::Evidence, state_set::StateSet};
-use crate::{Map, NgramLength, map::bits};
+use crate::{Map, NgramLength};
 
 impl<const V: usize, const WORDS: usize, const INDICES: usize> Consistency<V, WORDS, INDICES> {
     /// Whether max over the evidence of min over the map's walks of Eq. 3 is at most `distance`.
@@ -23,28 +23,26 @@ impl<const V: usize, const WORDS: usize, const INDICES: usize> Consistency<V, WO
             return false;
         }
         let [reached, next] = &mut self.reached;
-        for (set, vertex) in reached.iter_mut().zip(0..map.vertices()) {
-            *set = *self.readings.at(evidence, length, (vertex, map.label_of(vertex)), 0, distance);
+        for vertex in map.vertices() {
+            reached[vertex] = *self.readings.at(evidence, length, (vertex, map.label_of(vertex)), 0, distance);
         }
         for index in 1..labels {
-            for set in reached.iter_mut().take(usize::from(map.vertices())) {
-                *set = evidence.onward(set);
+            for vertex in map.vertices() {
+                reached[vertex] = evidence.onward(&reached[vertex]);
             }
-            for (set, vertex) in next.iter_mut().zip(0..map.vertices()) {
+            for vertex in map.vertices() {
                 let mut arriving = StateSet::EMPTY;
-                for neighbour in bits(map.neighbours(vertex)) {
-                    if let Some(from) = reached.get(usize::from(neighbour)) {
-                        arriving.insert_all(from);
-                    }
+                for neighbour in map.neighbours(vertex).iter() {
+                    arriving.insert_all(&reached[neighbour]);
                 }
-                let vertex = (vertex, map.label_of(vertex));
-                *set = arriving.intersection(self.readings.at(evidence, length, vertex, index, distance));
+                let label = (vertex, map.label_of(vertex));
+                next[vertex] = arriving.intersection(self.readings.at(evidence, length, label, index, distance));
             }
             core::mem::swap(reached, next);
         }
         let mut explained = StateSet::EMPTY;
-        for set in reached.iter().take(usize::from(map.vertices())) {
-            explained.insert_all(set);
+        for vertex in map.vertices() {
+            explained.insert_all(&reached[vertex]);
         }
         let missing = explained.first_missing(&evidence.ends(labels));
         if let Some(end) = missing {

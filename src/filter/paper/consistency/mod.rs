@@ -14,6 +14,7 @@ mod witness;
 
 pub use evidence::Evidence;
 
+use crate::map::PerVertex;
 use crate::{Map, NgramLength};
 use readings::Readings;
 use state_set::StateSet;
@@ -57,7 +58,7 @@ pub enum Direction {
 pub struct Consistency<const V: usize, const WORDS: usize, const INDICES: usize> {
     readings: Readings<V, WORDS, INDICES>,
     /// Where straight readings of the evidence have got to at each vertex; two rows, used in turn.
-    reached: [[StateSet<WORDS>; V]; 2],
+    reached: [PerVertex<StateSet<WORDS>, V>; 2],
     arms: confirmed::Arms<V, WORDS>,
     witnesses: Witnesses,
 }
@@ -67,7 +68,7 @@ impl<const V: usize, const WORDS: usize, const INDICES: usize> Consistency<V, WO
     pub const fn new() -> Self {
         Self {
             readings: Readings::new(),
-            reached: [[StateSet::EMPTY; V]; 2],
+            reached: [PerVertex::filled(StateSet::EMPTY); 2],
             arms: confirmed::Arms::new(),
             witnesses: Witnesses::new(),
         }

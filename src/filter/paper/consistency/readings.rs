@@ -1,7 +1,8 @@
 //! The states at which one label of the evidence agrees with one vertex of the map, kept between questions.
 
 use super::{evidence::Evidence, state_set::StateSet};
-use crate::{Fingerprint, History, NgramLength};
+use crate::map::PerVertex;
+use crate::{Fingerprint, History, NgramLength, VertexId};
 
 /// What a reading was made for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -21,8 +22,8 @@ const PLANES: usize = 2;
 /// The readings that were made last.
 #[derive(Clone, Debug)]
 pub(super) struct Readings<const V: usize, const WORDS: usize, const INDICES: usize> {
-    sets: [[[StateSet<WORDS>; V]; PLANES]; INDICES],
-    keys: [[[Key; V]; PLANES]; INDICES],
+    sets: [[PerVertex<StateSet<WORDS>, V>; PLANES]; INDICES],
+    keys: [[PerVertex<Key, V>; PLANES]; INDICES],
 }
 
 /// All steps of a fingerprint that lie within a distance of a label, the distance in units of the n-gram's steps.
@@ -35,7 +36,10 @@ fn range_steps(length: NgramLength, label: Fingerprint, distance: u16) -> (u16, 
 
 impl<const V: usize, const WORDS: usize, const INDICES: usize> Readings<V, WORDS, INDICES> {
     pub(super) const fn new() -> Self {
-        Self { sets: [[[StateSet::EMPTY; V]; PLANES]; INDICES], keys: [[[NOTHING; V]; PLANES]; INDICES] }
+        Self {
+            sets: [[PerVertex::filled(StateSet::EMPTY); PLANES]; INDICES],
+            keys: [[PerVertex::filled(NOTHING); PLANES]; INDICES],
+        }
     }
 
     /// The states of the evidence whose label number `index` is within `distance` of the label of a vertex.
@@ -43,7 +47,7 @@ impl<const V: usize, const WORDS: usize, const INDICES: usize> Readings<V, WORDS
         &mut self,
         evidence: &impl Evidence<WORDS>,
         length: NgramLength,
-        (vertex, label): (u8, Fingerprint),
+        (vertex, label): (VertexId, Fingerprint),
         index: u8,
         distance: u16,
     ) -> &StateSet<WORDS> {
@@ -52,11 +56,7 @@ impl<const V: usize, const WORDS: usize, const INDICES: usize> Readings<V, WORDS
         let (Some(sets), Some(keys)) = (self.sets.get_mut(index_slot), self.keys.get_mut(index_slot)) else {
             return const { &StateSet::EMPTY };
         };
-        let (Some(set), Some(key)) =
-            (sets[plane].get_mut(usize::from(vertex)), keys[plane].get_mut(usize::from(vertex)))
-        else {
-            return const { &StateSet::EMPTY };
-        };
+        let (set, key) = (&mut sets[plane][vertex], &mut keys[plane][vertex]);
         let wanted = Key { label, above_distance: distance + 1 };
         if *key != wanted {
             *set = evidence.reading(length, index, range_steps(length, label, distance));
@@ -66,17 +66,18 @@ impl<const V: usize, const WORDS: usize, const INDICES: usize> Readings<V, WORDS
     }
 
     pub(super) fn forget(&mut self) {
-        self.keys.as_flattened_mut().as_flattened_mut().fill(NOTHING);
+        self.keys.as_flattened_mut().fill(PerVertex::filled(NOTHING));
     }
 }
 
 impl<const V: usize, const WORDS: usize> Readings<V, WORDS, 1> {
     pub(super) fn include_newest(&mut self, history: &History<WORDS>, length: NgramLength) {
         let Some(newest) = history.newest(0) else { return };
-        let sets = self.sets.as_flattened_mut().as_flattened_mut();
-        for (set, key) in sets.iter_mut().zip(self.keys.as_flattened().as_flattened()) {
-            let (low, high) = range_steps(length, key.label, key.above_distance.wrapping_sub(1));
-            set.assign(history.newest_slot(), (low..=high).contains(&newest.steps()));
+        for (sets, keys) in self.sets.as_flattened_mut().iter_mut().zip(self.keys.as_flattened()) {
+            for (set, key) in sets.values_mut().iter_mut().zip(keys.values()) {
+                let (low, high) = range_steps(length, key.label, key.above_distance.wrapping_sub(1));
+                set.assign(history.newest_slot(), (low..=high).contains(&newest.steps()));
+            }
         }
     }
 }

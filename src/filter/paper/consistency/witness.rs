@@ -1,14 +1,13 @@
 //! What refuted a distance before mostly refutes it again: walks and n-grams that are asked first.
 
 use super::{evidence::Evidence, readings::Readings, state_set::StateSet};
-use crate::map::bits;
-use crate::{Map, NgramLength};
+use crate::{Map, NgramLength, VertexId, VertexSet};
 
 /// How many witnesses of each kind are remembered.
 const REMEMBERED: usize = 4;
 
 /// A walk on a map; the first `n` vertices count.
-pub(super) type Walk = [u8; NgramLength::MAX.get() as usize];
+pub(super) type Walk = [VertexId; NgramLength::MAX.get() as usize];
 
 /// Walks that no n-gram was near, and n-grams that no walk was near, on maps much like the next one. They decide no
 /// question wrongly: each is looked up in the map and the evidence at hand before it is believed.
@@ -23,7 +22,7 @@ pub(super) struct Witnesses {
 
 impl Witnesses {
     pub(super) const fn new() -> Self {
-        Self { walks: [[0; 7]; REMEMBERED], ends: [0; REMEMBERED], next_walk: 0, next_end: 0 }
+        Self { walks: [[VertexId::FIRST; 7]; REMEMBERED], ends: [0; REMEMBERED], next_walk: 0, next_end: 0 }
     }
 
     pub(super) fn remember_walk(&mut self, walk: Walk) {
@@ -47,7 +46,7 @@ impl Witnesses {
             let mut before = None;
             let mut states = StateSet::EMPTY;
             for (index, &vertex) in (0..length.get()).zip(walk) {
-                if vertex >= map.vertices() || before.is_some_and(|before| map.neighbours(before) >> vertex & 1 == 0) {
+                if !map.contains(vertex) || before.is_some_and(|before| !map.neighbours(before).contains(vertex)) {
                     return false;
                 }
                 let reading = readings.at(evidence, length, (vertex, map.label_of(vertex)), index, distance);
@@ -71,20 +70,21 @@ impl Witnesses {
     ) -> bool {
         let labels = evidence.straight_labels(length);
         self.ends.iter().any(|&end| {
-            let mut reached = u64::MAX;
+            let mut reached = VertexSet::EMPTY;
             for index in 0..labels {
                 let Some(label) = evidence.straight_label(length, end.into(), index) else { return false };
-                let mut near = 0;
-                for (vertex, own) in (0_u32..).zip(map.labels()) {
-                    let is_near = (own.steps() >> length.coarsening()).abs_diff(label) <= distance;
-                    near |= u64::from(is_near) << (vertex & 63);
+                let mut near = VertexSet::EMPTY;
+                for (vertex, own) in map.vertices().zip(map.labels()) {
+                    if (own.steps() >> length.coarsening()).abs_diff(label) <= distance {
+                        near.insert(vertex);
+                    }
                 }
                 if index > 0 {
-                    near &= bits(reached).fold(0, |arriving, vertex| arriving | map.neighbours(vertex));
+                    near &= reached.iter().fold(VertexSet::EMPTY, |arriving, vertex| arriving | map.neighbours(vertex));
                 }
                 reached = near;
             }
-            labels > 0 && reached == 0
+            labels > 0 && reached.is_empty()
         })
     }
 }

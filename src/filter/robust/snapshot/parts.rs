@@ -6,7 +6,7 @@ use super::super::record::{Entry, Record};
 use super::super::tally::{FADE_VISITS, Tally};
 use crate::map::bits;
 use crate::persist::snapshot::{Reader, SnapshotError, Writer};
-use crate::{Fingerprint, Map};
+use crate::{Fingerprint, Map, VertexId, VertexSet};
 
 /// Two floats, two counts, seven degrees.
 pub(super) const TALLY_BYTES: usize = 4 + 4 + 2 + 2 + 7;
@@ -153,11 +153,11 @@ impl<const N: usize, const V: usize, const HISTORY: usize> RobustFilter<N, V, HI
     /// Writes what was told last: the map, the numbers of its vertices, the path, and what is believed of it.
     pub(super) fn save_told(&self, writer: &mut Writer<'_>) -> Result<(), SnapshotError> {
         let map = &self.map;
-        writer.u8(map.vertices())?;
-        for ((vertex, &name), &belief) in (0..map.vertices()).zip(&self.names.names).zip(&self.belief_q16) {
+        writer.u8(map.vertices().len() as u8)?;
+        for ((vertex, &name), &belief) in map.vertices().zip(&self.names.names).zip(&self.belief_q16) {
             writer.u16(map.label_of(vertex).steps())?;
             writer.u32(map.visits(vertex))?;
-            save_row::<V>(writer, map.neighbours(vertex) as u32)?;
+            save_row::<V>(writer, map.neighbours(vertex).bits() as u32)?;
             writer.u8(name)?;
             writer.u32(belief)?;
         }
@@ -210,8 +210,8 @@ impl<const N: usize, const V: usize, const HISTORY: usize> RobustFilter<N, V, HI
             }
         })?;
         if kept {
-            for (vertex, &row) in (0..vertices).zip(&rows) {
-                bits(row.into()).for_each(|neighbour| map.add_edge(vertex, neighbour));
+            for (vertex, &row) in VertexId::first(vertices.into()).zip(&rows) {
+                VertexSet::from_bits(u64::from(row)).iter().for_each(|neighbour| map.add_edge(vertex, neighbour));
             }
             self.map = map;
             self.names.names = names;
