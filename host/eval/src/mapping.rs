@@ -23,7 +23,7 @@
 use toposlam::place::Place;
 use toposlam::reference::{self, PaperReference, VERTICES};
 use toposlam::ring::{RingFrame, RingGeometry};
-use toposlam::{FaultCounters, Filter, Map, Mapper, MapperConfig, MapperError, Turn, Update};
+use toposlam::{ConfigError, FaultCounters, Filter, Map, Mapper, MapperConfig, Turn, Update};
 
 use toposlam_sim::Step;
 use toposlam_sim::exploration::Exploration;
@@ -112,7 +112,7 @@ impl Mapping<{ reference::SONARS }> {
     ///
     /// # Errors
     /// The first setting that is out of its range.
-    pub fn reference(filter: FilterChoice) -> Result<Self, MapperError> {
+    pub fn reference(filter: FilterChoice) -> Result<Self, ConfigError> {
         Self::start(reference::RING, filter)
     }
 }
@@ -122,13 +122,13 @@ impl Mapping<SONARS_MAX> {
     ///
     /// # Errors
     /// The first setting that is out of its range.
-    pub fn of_recording(ring: &Ring, filter: FilterChoice) -> Result<Self, MapperError> {
+    pub fn of_recording(ring: &Ring, filter: FilterChoice) -> Result<Self, ConfigError> {
         Self::start(ring.geometry(), filter)
     }
 }
 
 impl<const SONARS: usize> Mapping<SONARS> {
-    fn start(geometry: RingGeometry<SONARS>, filter: FilterChoice) -> Result<Self, MapperError> {
+    fn start(geometry: RingGeometry<SONARS>, filter: FilterChoice) -> Result<Self, ConfigError> {
         let stages: Box<dyn Stages<SONARS>> = match filter {
             FilterChoice::Robust => Box::new(Robust(started(geometry, reference::FILTER)?)),
             FilterChoice::Paper => Box::new(Paper(started(geometry, reference::PAPER_FILTER)?, Ancestry::new())),
@@ -209,7 +209,7 @@ pub fn score_exploration(exploration: &Exploration<'_>) -> MapScore {
 fn started<const SONARS: usize, F: Filter<VERTICES>>(
     geometry: RingGeometry<SONARS>,
     filter: F::Config,
-) -> Result<Box<Mapper<SONARS, VERTICES, F>>, MapperError> {
+) -> Result<Box<Mapper<SONARS, VERTICES, F>>, ConfigError> {
     let mut mapper = Box::new(Mapper::new());
     let (place, seed) = (reference::PLACE, reference::SEED);
     mapper.start(&MapperConfig { geometry, place, filter, seed })?;

@@ -11,11 +11,11 @@ use core::{
 use static_cell::ConstStaticCell;
 use toposlam::{
     Config, ConfigError, Consistency, Direction, FaultCounters, FaultKind, Fingerprint, FingerprintError, History, Map,
-    MapperError, Ngram, NgramError, NgramLength, NgramTable, NgramsFull, Observation, PaperFilter, PerVertex, Prior,
-    RobustConfig, RobustFilter, Turn, VertexId, VertexSet, VerticesFull,
+    Ngram, NgramError, NgramLength, NgramTable, NgramsFull, Observation, PaperFilter, PerVertex, Prior, RobustConfig,
+    RobustFilter, Turn, VertexId, VertexSet, VerticesFull,
     persist::Persist,
     persist::snapshot::{FILTER_SECTION, Resume, Snapshot, SnapshotError, SnapshotPolicy, Writer},
-    place::{PlaceConfig, PlaceConfigError, PlaceDetector},
+    place::{PlaceConfig, PlaceDetector},
     reference,
     ring::{Echo, RingFrame, RingGeometry},
     wire::{
@@ -256,7 +256,7 @@ pub(crate) fn place() {
     static DETECTOR: ConstStaticCell<PlaceDetector<16>> = ConstStaticCell::new(PlaceDetector::new());
     let Some(detector) = DETECTOR.try_take() else { return };
     if let Err(error) = detector.start(PlaceConfig::default().opaque(), RingGeometry::even().opaque()) {
-        show::<PlaceConfigError>(error);
+        show::<ConfigError>(error);
     }
     for _ in 0..black_box(9) {
         black_box(detector.observe(&any_frame()));
@@ -273,7 +273,7 @@ pub(crate) fn mapper() {
     static MAPPER: ConstStaticCell<reference::RobotMapper> = ConstStaticCell::new(reference::RobotMapper::new());
     let Some(mapper) = MAPPER.try_take() else { return };
     if let Err(error) = mapper.start(&reference::MAPPER.opaque()) {
-        show::<MapperError>(error);
+        show::<ConfigError>(error);
     }
     for _ in 0..black_box(9) {
         black_box(mapper.observe(&any_frame(), any_turn()));
