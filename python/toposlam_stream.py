@@ -1,18 +1,18 @@
-"""What a toposlam robot says over its line, decoded, and what it can be told, encoded.
+"""Decoder and client for the serial protocol of a toposlam robot.
 
-The specification is `docs/wire.md`; frame version 1, protocol version 3. Nothing but the standard library is needed, but for
-serial ports pyserial.
+The specification is `docs/wire.md`; frame version 2, protocol version 4. The module needs only the standard library, and
+pyserial for serial ports.
 
-    from toposlam_stream import Decoder, Picture, open_line
+    from toposlam_stream import Decoder, MapReplica, open_line
 
-    decoder, picture = Decoder(), Picture()
+    decoder, replica = Decoder(), MapReplica()
     with open_line("tcp:127.0.0.1:7070") as line:      # or "/dev/ttyACM0", or a file of raw bytes
-        while not picture.is_converged():
+        while not replica.is_converged():
             for event in decoder.feed(line.read()):
-                picture.apply(event)
-    print(picture.edges())
+                replica.apply(event)
+    print(replica.edges())
 
-`python -m toposlam_stream LINE` prints every event as a line of JSON. To tell a robot what to do, see `Client`.
+`python -m toposlam_stream LINE` prints every event as a line of JSON. `Client` sends commands to a robot.
 
 Lengths are in millimetres, logarithms natural and times 65536, probabilities in thousandths.
 """
@@ -35,14 +35,14 @@ import zlib
 from dataclasses import dataclass
 from typing import Annotated, Any, Callable, Iterable, Iterator, Optional, Union
 
-FRAME_VERSION = 1
+FRAME_VERSION = 2
 """The first byte of every frame of a robot; in a frame to a robot 128 is added."""
-PROTOCOL_VERSION = 3
-"""The version of the messages known here."""
-SCHEMA_HASH = 0x06A5_446B_0B1D_C83D
-"""FNV-1a (64 bit) of the description of the messages known here, see `docs/wire.md`."""
+PROTOCOL_VERSION = 4
+"""The version of the messages."""
+SCHEMA_HASH = 0x8352_6E81_4B95_713B
+"""The 64-bit FNV-1a hash of the schema in `docs/wire.md`."""
 CHUNK_BYTES = 64
-"""The most bytes of a snapshot that one request or reply carries."""
+"""The most bytes of a snapshot in one request or reply."""
 
 _TO_ROBOT = FRAME_VERSION | 1 << 7
 _HEADER_BYTES = 3
@@ -53,21 +53,21 @@ _LATE_WINDOW = 64
 _COUNT_MAX = 0xFFFF_FFFF
 
 
-# How values travel: postcard's format.
+# The encoding of values: postcard's format.
 
 
 class _UnknownPayload(Exception):
-    """The payload is none that is known here."""
+    """The payload is unknown."""
 
 
 @dataclass(frozen=True)
 class _Codec:
-    """How one type travels."""
+    """The encoding of one type."""
 
     read: Callable[[bytes, int], tuple[Any, int]]
-    """The value that begins at a place of a payload, and the place after it. IndexError when the payload ends before."""
+    """Decodes the value at an offset of a payload; returns it and the offset after it. IndexError if the payload is too short."""
     write: Callable[[Any, bytearray], None]
-    """Appends a value. ValueError when it is out of its range."""
+    """Appends a value. ValueError if it is out of its range."""
 
 
 def _unsigned(bits: int) -> _Codec:
@@ -135,7 +135,7 @@ def _flag() -> _Codec:
 
 
 def _kind(of: type[enum.IntEnum]) -> _Codec:
-    """A kind that is one byte; one that is not known here is read as the first."""
+    """An enum that is one byte; an unknown number decodes to the first member."""
     kinds = [of(number) for number in range(256)]
     return _Codec(lambda payload, at: (kinds[payload[at]], at + 1), lambda value, out: out.append(value))
 
@@ -157,7 +157,7 @@ def _optional(codec: _Codec) -> _Codec:
 
 
 def _list(codec: _Codec, most: int, build: Callable[[Iterable[Any]], Any] = tuple) -> _Codec:
-    """Up to so many elements: their number, then each."""
+    """A list: the number of elements, at most `most`, then the elements."""
     number = _unsigned(64)
 
     def read(payload: bytes, at: int) -> tuple[Any, int]:
@@ -181,7 +181,7 @@ def _list(codec: _Codec, most: int, build: Callable[[Iterable[Any]], Any] = tupl
 
 
 def _record(of: type) -> _Codec:
-    """The fields of a dataclass, in order. Their types say how each travels."""
+    """The fields of a dataclass, in order; their types say how each is encoded."""
     hints = typing.get_type_hints(of, include_extras=True)
     names = [field.name for field in dataclasses.fields(of)]
     codecs = [hints[name].__metadata__[0] for name in names]
@@ -203,7 +203,7 @@ def _record(of: type) -> _Codec:
 
 
 def _choice(*classes: type) -> _Codec:
-    """One of some dataclasses: its number in this order, then its fields."""
+    """One of several dataclasses: its number in this order, then its fields."""
     number = _unsigned(32)
     records = [_record(of) for of in classes]
     places = {of: (place, record.write) for place, (of, record) in enumerate(zip(classes, records))}
@@ -236,7 +236,7 @@ OptionalU8 = Annotated[Optional[int], _optional(_byte())]
 Chunk = Annotated[bytes, _list(_byte(), CHUNK_BYTES, bytes)]
 
 
-# What a robot says.
+# Messages of a robot.
 
 
 class ResetCause(enum.IntEnum):
@@ -256,7 +256,7 @@ class ResetCause(enum.IntEnum):
 
 
 class FaultKind(enum.IntEnum):
-    """What a robot counts that went wrong."""
+    """The kinds of faults that a robot counts."""
 
     SONAR_SILENT = 0
     SONAR_OUT_OF_RANGE = 1
@@ -276,19 +276,19 @@ class FaultKind(enum.IntEnum):
     LOOP_LATE = 15
 
 
-class JourneyState(enum.IntEnum):
-    """How the way to a vertex goes; all but UNDERWAY are the end of it."""
+class GoalState(enum.IntEnum):
+    """The state of a goal; all but ACTIVE are final."""
 
     OTHER = 0
-    UNDERWAY = 1
-    ARRIVED = 2
+    ACTIVE = 1
+    REACHED = 2
     NO_ROUTE = 3
-    VERTEX_GONE = 4
-    LOST = 5
+    VERTEX_REMOVED = 4
+    TIMED_OUT = 5
     REPLACED = 6
 
     @classmethod
-    def _missing_(cls, value: object) -> JourneyState:
+    def _missing_(cls, value: object) -> GoalState:
         return cls.OTHER
 
 
@@ -315,7 +315,7 @@ class Refusal(enum.IntEnum):
 
 @dataclass(frozen=True)
 class Capacities:
-    """What a robot has room for."""
+    """The capacities of a robot."""
 
     vertices: U8
     hypotheses: U16
@@ -327,49 +327,49 @@ class Capacities:
 
 @dataclass(frozen=True)
 class Hello:
-    """Who is speaking."""
+    """The introduction of a robot."""
 
     protocol_version: U16
     schema_hash: U64
     boot: U32
-    """Differs from one start to the next; 0 when the robot cannot tell its starts apart."""
+    """Differs from one start of the robot to the next; 0 if it has no such number."""
     reset_cause: Annotated[ResetCause, _kind(ResetCause)]
     seed: U64
     capacities: Annotated[Capacities, _record(Capacities)]
 
     def complaint(self) -> Optional[str]:
-        """What keeps this module from understanding the robot wholly; None when nothing does.
+        """Why this module does not understand the robot fully; None if it does.
 
-        Messages of another protocol version are understood as far as both know them. Under the same version with
-        another schema hash they mean other things: do not trust what is shown.
+        Of another protocol version, the messages that both sides know are understood. With the same version and another
+        schema hash the messages have other meanings: do not trust them.
         """
         if self.protocol_version != PROTOCOL_VERSION:
             return (
-                f"the robot speaks protocol version {self.protocol_version}, this program {PROTOCOL_VERSION}: "
-                "messages that only one knows are missing"
+                f"the robot has protocol version {self.protocol_version}, this program {PROTOCOL_VERSION}: "
+                "messages that only one of them knows are missing"
             )
         if self.schema_hash != SCHEMA_HASH:
             return (
-                f"not understood: the robot's messages have schema hash {self.schema_hash:#018x}, "
-                f"this program knows {SCHEMA_HASH:#018x}"
+                f"not understood: the schema hash of the robot is {self.schema_hash:#018x}, "
+                f"that of this program {SCHEMA_HASH:#018x}"
             )
         return None
 
 
 @dataclass(frozen=True)
 class Place:
-    """The detector confirmed a place: what it saw, before any inference."""
+    """A visit to a place, as measured by the detector."""
 
     place_index: U32
     frame_index: U32
     radius_mm: U16
     degree: OptionalU8
-    """How many ways lead away, when the detector could count them."""
+    """The number of ways that lead away; None if the detector could not count them."""
 
 
 @dataclass(frozen=True)
 class Map:
-    """How large the map now is, and a digest of it."""
+    """The size of the map and its digest."""
 
     vertices: U8
     edges: U16
@@ -378,7 +378,7 @@ class Map:
 
 @dataclass(frozen=True)
 class Vertex:
-    """The label of a vertex is now this."""
+    """The label of a vertex."""
 
     vertex: U8
     radius_mm: U16
@@ -387,7 +387,7 @@ class Vertex:
 
 @dataclass(frozen=True)
 class Edge:
-    """An edge now exists, or does no longer; a ≤ b."""
+    """An edge was added or removed; a ≤ b."""
 
     a: U8
     b: U8
@@ -396,29 +396,47 @@ class Edge:
 
 @dataclass(frozen=True)
 class Location:
-    """The robot is at this vertex."""
+    """The vertex that the robot is at."""
 
     place_index: U32
     vertex: U8
 
 
+class Factors:
+    """The factors of a weight, as logarithms: one of these."""
+
+    @dataclass(frozen=True)
+    class Robust:
+        """The factors of the robust filter: labels, moves and size of the map."""
+
+        ln_labels_q16: I32
+        ln_moves_q16: I32
+        ln_size_q16: I32
+
+    @dataclass(frozen=True)
+    class Paper:
+        """The factors of the paper's filter: Eq. 7, 8 and 9."""
+
+        ln_label_q16: I32
+        ln_consistency_q16: I32
+        ln_size_q16: I32
+
+
 @dataclass(frozen=True)
 class Evidence:
-    """Why the inference believes so."""
+    """Why the filter chose its best map."""
 
     place_index: U32
     consistency_mm: U16
-    """65535 when it is infinite."""
-    ln_label_q16: I32
-    ln_consistency_q16: I32
-    ln_size_q16: I32
+    """65535 if it is infinite."""
+    factors: Annotated[Union[Factors.Robust, Factors.Paper], _choice(Factors.Robust, Factors.Paper)]
     lead_q16: I32
     distinct_hypotheses: U16
 
 
 @dataclass(frozen=True)
 class Row:
-    """All that the map says about a vertex; bit w of `neighbours` stands for vertex w."""
+    """One vertex of the map; bit w of `neighbours` stands for vertex w."""
 
     vertex: U8
     radius_mm: U16
@@ -428,7 +446,7 @@ class Row:
 
 @dataclass(frozen=True)
 class Fault:
-    """How often a kind of fault was seen since the start; `kind` is the number of a `FaultKind`, or a later one."""
+    """The count of a kind of fault since the start; `kind` is the number of a `FaultKind`, or a later one."""
 
     kind: U8
     count: U32
@@ -436,18 +454,18 @@ class Fault:
 
 @dataclass(frozen=True)
 class Health:
-    """How the firmware is doing; what it does not measure is 0."""
+    """The state of the firmware; a value that it does not measure is 0."""
 
     uptime_ms: U32
     loop_count: U32
     stack_high_water_bytes: U32
-    worst_update_us: U32
+    worst_turn_us: U32
 
 
 DEAD = "dead"
-"""What a sonar says that does not work."""
+"""The echo of a dead sensor."""
 SILENCE = "silence"
-"""What a sonar says that hears no echo."""
+"""The echo of a sensor that hears nothing."""
 Echo = Union[int, str]
 """A range in millimetres, `SILENCE` or `DEAD`."""
 
@@ -465,15 +483,15 @@ def _echo() -> _Codec:
 
 @dataclass(frozen=True)
 class Ring:
-    """One reading of the sonar ring, in the order of the ring."""
+    """One frame of the sonar ring, in the order of the ring."""
 
     frame_index: U32
     ranges_mm: Annotated[tuple[Echo, ...], _list(_echo(), 32)]
 
 
 @dataclass(frozen=True)
-class PlaceProbability:
-    """How probable it is that the robot is at a vertex."""
+class VertexProbability:
+    """The probability that the robot is at a vertex."""
 
     vertex: U8
     permille: U16
@@ -481,40 +499,40 @@ class PlaceProbability:
 
 @dataclass(frozen=True)
 class Belief:
-    """Where the robot may be, the most probable first, and how far the map is to be trusted."""
+    """Where the robot may be, the most probable vertex first, and the probability of the map."""
 
     place_index: U32
     map_permille: U16
-    places: Annotated[tuple[PlaceProbability, ...], _list(_record(PlaceProbability), 8)]
+    vertices: Annotated[tuple[VertexProbability, ...], _list(_record(VertexProbability), 8)]
 
-    def _renamed(self, renamed: Renamed) -> Belief:
-        """A vertex that is gone is left out, and those that are one now are added up."""
+    def _remapped(self, remapped: Remapped) -> Belief:
+        """Removed vertices are left out, the probabilities of merged ones are added."""
         permille_of: dict[int, int] = {}
-        for place in self.places:
-            now = renamed.now(place.vertex)
+        for at in self.vertices:
+            now = remapped.now(at.vertex)
             if now is not None:
-                permille_of[now] = min(permille_of.get(now, 0) + place.permille, 0xFFFF)
-        places = tuple(PlaceProbability(vertex, permille) for vertex, permille in permille_of.items())
-        return dataclasses.replace(self, places=places)
+                permille_of[now] = min(permille_of.get(now, 0) + at.permille, 0xFFFF)
+        vertices = tuple(VertexProbability(vertex, permille) for vertex, permille in permille_of.items())
+        return dataclasses.replace(self, vertices=vertices)
 
 
 @dataclass(frozen=True)
-class Renamed:
-    """The number now of each vertex by its number before, 255 when it is gone; two with one number were merged."""
+class Remapped:
+    """The new id of each vertex by its id before, 255 if it was removed; vertices with the same new id were merged."""
 
     place_index: U32
-    names: Annotated[tuple[int, ...], _list(_byte(), 64)]
+    vertices: Annotated[tuple[int, ...], _list(_byte(), 64)]
 
     def now(self, before: int) -> Optional[int]:
-        """The number now of a vertex by its number before; None when it is gone."""
-        if before >= len(self.names):
+        """The new id of a vertex by its id before; None if it was removed."""
+        if before >= len(self.vertices):
             return before
-        return None if self.names[before] == 255 else self.names[before]
+        return None if self.vertices[before] == 255 else self.vertices[before]
 
 
 @dataclass(frozen=True)
 class Worst:
-    """What the map explains worst, and the walk of the map that is nearest to it."""
+    """The n-gram that the map explains worst, and the nearest walk of the map."""
 
     place_index: U32
     distance_mm: U16
@@ -532,15 +550,15 @@ class Version:
 
 
 class Outcome:
-    """What comes of a request: one of these."""
+    """The outcome of a request: one of these."""
 
     @dataclass(frozen=True)
     class Done:
-        """It is done, or under way."""
+        """The command was accepted."""
 
     @dataclass(frozen=True)
     class Info:
-        """Which robot this is and what it does."""
+        """The state of the robot."""
 
         version: Annotated[Version, _record(Version)]
         boot: U32
@@ -548,13 +566,13 @@ class Outcome:
         uptime_ms: U32
         paused: Flag
         localise_only: Flag
-        going_to: OptionalU8
+        goal: OptionalU8
         stored_bytes: U16
         stored_places_ago: U32
 
     @dataclass(frozen=True)
     class Snapshot:
-        """A piece of a snapshot; no bytes at its end."""
+        """A chunk of a snapshot; no bytes at its end."""
 
         total: U16
         offset: U16
@@ -562,7 +580,7 @@ class Outcome:
 
     @dataclass(frozen=True)
     class Refused:
-        """It was not done, and everything is as it was."""
+        """The command was refused; nothing has changed."""
 
         refusal: Annotated[Refusal, _kind(Refusal)]
 
@@ -572,15 +590,15 @@ AnyOutcome = Union[Outcome.Done, Outcome.Info, Outcome.Snapshot, Outcome.Refused
 
 @dataclass(frozen=True)
 class Reply:
-    """The answer to a request."""
+    """The reply to a request."""
 
     request: U16
     outcome: Annotated[AnyOutcome, _choice(Outcome.Done, Outcome.Info, Outcome.Snapshot, Outcome.Refused)]
 
 
 @dataclass(frozen=True)
-class Drive:
-    """Where the drive steers: counter-clockwise from where the bearings of the ring count from."""
+class Velocity:
+    """The velocity command of a ring frame: counter-clockwise from the zero of the ring's bearings."""
 
     frame_index: U32
     heading_mrad: I16
@@ -589,24 +607,40 @@ class Drive:
 
 
 @dataclass(frozen=True)
-class Journey:
-    """How the way to a vertex goes that the robot was told to go to."""
+class GoalStatus:
+    """The status of the goal."""
 
     vertex: U8
-    state: Annotated[JourneyState, _kind(JourneyState)]
+    state: Annotated[GoalState, _kind(GoalState)]
 
 
 Message = Union[
-    Hello, Place, Map, Vertex, Edge, Location, Evidence, Row, Fault, Health, Ring, Belief, Renamed, Worst, Reply, Drive, Journey
+    Hello,
+    Place,
+    Map,
+    Vertex,
+    Edge,
+    Location,
+    Evidence,
+    Row,
+    Fault,
+    Health,
+    Ring,
+    Belief,
+    Remapped,
+    Worst,
+    Reply,
+    Velocity,
+    GoalStatus,
 ]
 _MESSAGE = _choice(*typing.get_args(Message))
 
 
-# What a robot can be told.
+# Requests to a robot.
 
 
 class Setting(enum.IntEnum):
-    """What can be set while a robot runs; `docs/wire.md` has the ranges."""
+    """The settings that can be changed while a robot runs; `docs/wire.md` has the ranges."""
 
     NOISE_MM = 0
     HYPOTHESES = 1
@@ -632,70 +666,70 @@ def _setting() -> _Codec:
 
 
 class Command:
-    """What a robot is told to do: one of these."""
+    """A command to a robot: one of these."""
 
     @dataclass(frozen=True)
     class Info:
-        """Say which robot this is and what it does; the outcome is `Outcome.Info`."""
+        """Requests the state of the robot; the outcome is `Outcome.Info`."""
 
     @dataclass(frozen=True)
     class GetMap:
-        """Send the whole rolling picture at once."""
+        """Requests the whole map."""
 
     @dataclass(frozen=True)
     class GetSnapshot:
-        """Send a piece of a snapshot; with offset 0 one is taken first. The outcome is `Outcome.Snapshot`."""
+        """Requests a chunk of a snapshot; offset 0 takes a new one. The outcome is `Outcome.Snapshot`."""
 
         offset: U16
 
     @dataclass(frozen=True)
     class RestoreBegin:
-        """Get ready for a snapshot with that CRC (`zlib.crc32`)."""
+        """Starts the transfer of a snapshot with this CRC (`zlib.crc32`)."""
 
         length: U16
         crc: U32
 
     @dataclass(frozen=True)
     class RestoreChunk:
-        """Take a piece of the snapshot, in order; a piece may come again."""
+        """Transfers a chunk of the snapshot, in order; a chunk may be repeated."""
 
         offset: U16
         bytes: Chunk
 
     @dataclass(frozen=True)
     class RestoreCommit:
-        """Go on with the map of the snapshot that was sent."""
+        """Restores the snapshot that was transferred."""
 
     @dataclass(frozen=True)
     class Reset:
-        """Forget the map and start anew."""
+        """Clears the map and starts again."""
 
     @dataclass(frozen=True)
     class SetConfig:
-        """Go on with another value of a setting."""
+        """Changes one setting."""
 
         setting: Annotated[Setting, _setting()]
         value: U16
 
     @dataclass(frozen=True)
     class LocaliseOnly:
-        """Keep the map as it is and only tell where the robot is, or go on mapping."""
+        """Switches between localisation in the present map and mapping."""
 
         on: Flag
 
     @dataclass(frozen=True)
     class GoTo:
-        """Drive to a vertex of the map; `Journey` tells how that goes."""
+        """Sends the robot to a vertex; `GoalStatus` reports the progress."""
 
         vertex: U8
 
     @dataclass(frozen=True)
     class Explore:
-        """Go on exploring."""
+        """Makes the robot explore."""
 
     @dataclass(frozen=True)
     class Pause:
-        """Stand still and observe nothing, or go on."""
+        """Pauses or resumes the robot."""
 
         on: Flag
 
@@ -718,7 +752,7 @@ AnyCommand = Union[
 
 @dataclass(frozen=True)
 class Request:
-    """A command with a number, which differs from that of the request before and by which its reply is known."""
+    """A command with an id, different from that of the previous request; the reply repeats it."""
 
     id: U16
     command: Annotated[AnyCommand, _choice(*typing.get_args(AnyCommand))]
@@ -731,23 +765,23 @@ _REQUEST = _record(Request)
 
 
 class Arrival(enum.Enum):
-    """How a frame follows on those before."""
+    """How the sequence number of a frame follows on the previous ones."""
 
     FIRST = "First"
     """The first intact frame."""
     IN_ORDER = "InOrder"
-    """The one that was due."""
+    """The next one."""
     AFTER_GAP = "AfterGap"
     """Frames in between are missing."""
     LATE = "Late"
-    """One of the last 64 numbers again: it was repeated or overtaken; ignore it."""
+    """One of the last 64 numbers: the frame was repeated or overtaken; ignore it."""
     RESTART = "Restart"
-    """The sender has started anew: what was heard before means nothing."""
+    """The sender has restarted: everything received before is void."""
 
 
 @dataclass(frozen=True)
 class Heard:
-    """A message or a request, and how its frame follows on those before."""
+    """A message or a request, and how its frame follows on the previous ones."""
 
     sequence: int
     arrival: Arrival
@@ -768,7 +802,7 @@ class DecodeError(enum.Enum):
 
 @dataclass(frozen=True)
 class Damaged:
-    """Bytes that were no message; they are counted."""
+    """Bytes that are no message; they are counted."""
 
     error: DecodeError
     version: Optional[int] = None
@@ -785,11 +819,11 @@ Event = Union[Heard, Damaged]
 
 @dataclass
 class Counters:
-    """What a decoder has seen since it was made; every count saturates at 32 bits."""
+    """The counts of a decoder; each saturates at 32 bits."""
 
     messages: int = 0
     lost: int = 0
-    """Frames that are missing according to the sequence numbers; a corrupt one is among them."""
+    """Frames that are missing according to the sequence numbers; a corrupt frame is one of them."""
     corrupt: int = 0
     cut: int = 0
     too_long: int = 0
@@ -807,10 +841,10 @@ _COUNTER_OF = {
 
 
 class Decoder:
-    """Takes bytes in pieces of any length and hands out the messages.
+    """Decodes a stream of bytes, in pieces of any length, into messages.
 
-    Whatever goes wrong inside a frame, the next zero ends it. No bytes make it raise, and it keeps at most one frame.
-    With `requests` it is the robot's ear and hands out requests.
+    The next zero ends every frame, whatever is wrong inside it. No input raises an exception, and at most one frame is
+    buffered. With `requests` it decodes requests to a robot.
     """
 
     def __init__(self, requests: bool = False) -> None:
@@ -821,7 +855,7 @@ class Decoder:
         self._last_boot: Optional[int] = None
 
     def feed(self, data: bytes) -> list[Event]:
-        """Takes bytes, and gives what was completed by them, in order."""
+        """Decodes bytes; returns the events that they complete, in order."""
         *frames, rest = bytes(data).split(b"\0")
         if frames:
             frames[0] = self._begun + frames[0]
@@ -897,16 +931,16 @@ class Decoder:
 
 
 class Encoder:
-    """Packs requests, and messages for who plays a robot, into frames and numbers them.
+    """Encodes requests, and messages for tests, as numbered frames.
 
-    Send one zero byte before the first frame, so that noise from before does not spoil it.
+    Send one zero byte before the first frame, so that earlier noise does not corrupt it.
     """
 
     def __init__(self, first_sequence: int = 0) -> None:
         self._sequence = first_sequence
 
     def encode(self, message: Union[Request, Message]) -> bytes:
-        """The frame, its closing zero included. ValueError when a field is out of its range."""
+        """The frame with its closing zero. ValueError if a field is out of its range."""
         version, codec = (_TO_ROBOT, _REQUEST) if isinstance(message, Request) else (FRAME_VERSION, _MESSAGE)
         raw = bytearray(struct.pack("<BH", version, self._sequence))
         codec.write(message, raw)
@@ -915,14 +949,13 @@ class Encoder:
         return b"".join(bytes([len(block) + 1]) + block for block in raw.split(b"\0")) + b"\0"
 
 
-# The map as heard.
+# The map replica.
 
 
-class Picture:
-    """The map as heard so far, and whether it is the robot's; and the newest of everything else.
+class MapReplica:
+    """A replica of the robot's map, and the newest of its other messages.
 
-    Any message may be missing, doubled or late: late ones are ignored, and what is missing comes round with the rolling
-    picture.
+    Messages may be lost, repeated or late: late ones are ignored, and the robot repeats its map in turn.
     """
 
     def __init__(self) -> None:
@@ -930,26 +963,26 @@ class Picture:
 
     def _forget(self) -> None:
         self.vertices = 0
-        """How many vertices the map has, as far as heard."""
+        """The number of known vertices."""
         self.hello: Optional[Hello] = None
         self.location: Optional[Location] = None
         self.evidence: Optional[Evidence] = None
         self.health: Optional[Health] = None
         self.belief: Optional[Belief] = None
         self.worst: Optional[Worst] = None
-        self.journey: Optional[Journey] = None
+        self.goal_status: Optional[GoalStatus] = None
         self.place: Optional[Place] = None
         self.ring: Optional[Ring] = None
-        self.drive: Optional[Drive] = None
+        self.velocity: Optional[Velocity] = None
         self.faults: dict[FaultKind, int] = {kind: 0 for kind in FaultKind}
         self._labels: dict[int, tuple[int, int]] = {}
-        """Radius and visits of the vertices whose label was heard."""
+        """Radius and visits of the vertices with a known label."""
         self._neighbours = [0] * _VERTICES_MAX
         self._digest: Optional[int] = None
-        """The digest of the robot's map, unless a message was missed since it was heard."""
+        """The digest of the robot's map, unless a message was lost since it was received."""
 
     def apply(self, event: Event) -> None:
-        """Takes in one event of a decoder."""
+        """Applies one event of a decoder."""
         if isinstance(event, Damaged) or event.arrival is Arrival.LATE:
             return
         if event.arrival is Arrival.AFTER_GAP:
@@ -973,29 +1006,31 @@ class Picture:
         elif isinstance(message, Fault):
             if message.kind < len(FaultKind):
                 self.faults[FaultKind(message.kind)] = message.count
-        elif isinstance(message, Renamed):
-            self._rename(message)
+        elif isinstance(message, Remapped):
+            self._remap(message)
+        elif isinstance(message, GoalStatus):
+            self.goal_status = message
         elif not isinstance(message, (Reply, Request)):
             setattr(self, type(message).__name__.lower(), message)
 
     def is_converged(self) -> bool:
-        """Whether the map heard so far is the robot's: its digest is the one that the robot sent last, and no frame was
-        missed since."""
+        """Whether the replica equals the robot's map: its digest is the one that the robot sent last, and no frame was lost
+        since."""
         rows = filter(None, map(self.row, range(self.vertices)))
         canonical = b"".join(struct.pack("<HIQ", row.radius_mm, row.visits, row.neighbours) for row in rows)
         return self._digest == zlib.crc32(bytes([self.vertices]) + canonical)
 
     def is_complete(self) -> bool:
-        """Whether the label of every vertex known to exist was heard. Edges may still be missing."""
+        """Whether the label of every known vertex was received. Edges may be missing."""
         return self._labels.keys() == set(range(self.vertices))
 
     def row(self, vertex: int) -> Optional[Row]:
-        """All that was heard of a vertex; None while its label was not."""
+        """The label and the neighbours of a vertex; None until its label was received."""
         label = self._labels.get(vertex)
         return None if label is None else Row(vertex, *label, self._neighbours[vertex])
 
     def edges(self) -> list[tuple[int, int]]:
-        """Every edge once, the smaller vertex first, in ascending order; equal ends are a corridor back to its place."""
+        """Every edge once, the smaller vertex first, in ascending order; equal ends are a corridor that returns to its place."""
         return [(a, b) for a in range(self.vertices) for b in _bits(self._neighbours[a]) if a <= b]
 
     def _set_label(self, label: Union[Vertex, Row]) -> None:
@@ -1015,18 +1050,17 @@ class Picture:
             self.vertices = max(self.vertices, a + 1, b + 1)
 
     def _resize(self, vertices: int) -> None:
-        """Vertices that do not exist any more go with their edges."""
+        """Removes the vertices from `vertices` on and their edges."""
         self.vertices = min(vertices, _VERTICES_MAX)
         kept = (1 << self.vertices) - 1
         for vertex in range(_VERTICES_MAX):
             self._neighbours[vertex] &= kept if vertex < self.vertices else 0
         self._labels = {vertex: label for vertex, label in self._labels.items() if vertex < self.vertices}
 
-    def _rename(self, renamed: Renamed) -> None:
-        """Gives the vertices their new numbers. The map is that of the update once its size follows; until then the digest
-        of the map before means nothing."""
+    def _remap(self, remapped: Remapped) -> None:
+        """Applies new vertex ids. The digest is unknown until the size of the new map follows."""
         self._digest = None
-        names = [renamed.now(vertex) for vertex in range(_VERTICES_MAX)]
+        names = [remapped.now(vertex) for vertex in range(_VERTICES_MAX)]
         self.vertices = min(max((now + 1 for now in names[: self.vertices] if now is not None), default=0), _VERTICES_MAX)
         labels, self._labels = self._labels, {}
         neighbours, self._neighbours = self._neighbours, [0] * _VERTICES_MAX
@@ -1036,18 +1070,18 @@ class Picture:
             for other in (names[other] for other in _bits(neighbours[before])):
                 if other is not None and other < _VERTICES_MAX:
                     self._neighbours[now] |= 1 << other
-            # Of vertices that are one now, the first one's label stays.
+            # Merged vertices keep the first label.
             if before in labels:
                 self._labels.setdefault(now, labels[before])
         if self.location:
-            self.location = _with_vertex(self.location, renamed.now(self.location.vertex))
-        if self.journey:
-            self.journey = _with_vertex(self.journey, renamed.now(self.journey.vertex))
+            self.location = _with_vertex(self.location, remapped.now(self.location.vertex))
+        if self.goal_status:
+            self.goal_status = _with_vertex(self.goal_status, remapped.now(self.goal_status.vertex))
         if self.belief:
-            self.belief = self.belief._renamed(renamed)
+            self.belief = self.belief._remapped(remapped)
         if self.worst:
             walk = self.worst.vertices
-            kept = tuple(vertex for vertex in map(renamed.now, walk) if vertex is not None)
+            kept = tuple(vertex for vertex in map(remapped.now, walk) if vertex is not None)
             self.worst = dataclasses.replace(self.worst, vertices=kept) if len(kept) == len(walk) else None
 
 
@@ -1065,8 +1099,8 @@ def _bits(row: int) -> Iterator[int]:
 
 
 def to_json(event: Event) -> dict[str, Any]:
-    """An event as plain data, in the shape that `toposlam` prints too: `event` is the name of the message, or `Damaged`;
-    the message's fields stand beside it. `lost` is there when frames are missing before it."""
+    """An event as plain data, as the `toposlam` command prints it: `event` is the name of the message, or `Damaged`, with
+    the fields of the message beside it. `lost` is present if frames are missing before it."""
     if isinstance(event, Damaged):
         return {"event": "Damaged", "error": str(event)}
     plain: dict[str, Any] = {**_plain(event.message), "event": type(event.message).__name__, "sequence": event.sequence}
@@ -1076,7 +1110,7 @@ def to_json(event: Event) -> dict[str, Any]:
 
 
 def json_line(plain: Any) -> str:
-    """Plain data as one line of JSON: keys in order, no spaces."""
+    """Plain data as one line of JSON: keys sorted, no spaces."""
     return json.dumps(plain, sort_keys=True, separators=(",", ":"))
 
 
@@ -1089,7 +1123,7 @@ def _plain(value: Any) -> Any:
         plain = {field.name: _plain(getattr(value, field.name)) for field in dataclasses.fields(value)}
         if type(value).__qualname__ == type(value).__name__:
             return plain
-        # One of the outcomes or commands: its name tells which.
+        # A nested class is a variant: its name is the key.
         return {type(value).__name__: plain} if plain else type(value).__name__
     if isinstance(value, (tuple, bytes)):
         return [_plain(element) for element in value]
@@ -1099,7 +1133,7 @@ def _plain(value: Any) -> Any:
 # Lines.
 
 READ_TIMEOUT_S = 0.02
-"""A read of a line gives up after this long when nothing comes."""
+"""The timeout of one read."""
 
 
 class Line:
@@ -1107,7 +1141,7 @@ class Line:
 
     def __init__(self, read: Callable[[], bytes], write: Callable[[bytes], object], close: Callable[[], None]) -> None:
         self.read = read
-        """What has come; nothing when nothing comes for a while. EOFError when the line has ended."""
+        """Returns the received bytes, none after a timeout. EOFError at the end of the line."""
         self.write = write
         """Sends bytes."""
         self.close = close
@@ -1120,9 +1154,9 @@ class Line:
 
 
 def open_line(name: str, baud: int = 115_200) -> Line:
-    """Opens a line by its name: `tcp:HOST:PORT`, a serial port, or a file of raw bytes to be read again.
+    """Opens a line by its name: `tcp:HOST:PORT`, a serial port, or a file of recorded bytes.
 
-    OSError when it cannot be opened, ImportError for a serial port without pyserial, ValueError for a name that is none.
+    OSError if it cannot be opened, ImportError for a serial port without pyserial, ValueError for an invalid name.
     """
     if name.startswith("tcp:"):
         address = re.fullmatch(r"tcp:(.+):(\d+)", name)
@@ -1168,15 +1202,15 @@ def _unless_ended(data: bytes) -> bytes:
 
 
 def _refuse_to_write(_: bytes) -> None:
-    raise OSError("a recording cannot be told anything")
+    raise OSError("cannot write to a recording")
 
 
 class NoReply(Exception):
-    """The robot did not answer: it is not there, or does not know the command."""
+    """The robot did not reply: it is absent, or does not know the command."""
 
 
 class Client:
-    """Tells a robot on a line what to do, and listens meanwhile.
+    """Sends commands to a robot on a line, and listens meanwhile.
 
         with open_line("tcp:127.0.0.1:7070") as line:
             client = Client(line)
@@ -1185,31 +1219,31 @@ class Client:
             if isinstance(outcome, Outcome.Refused):
                 print(outcome.refusal.name)
 
-    A request whose reply does not come in time is sent again, which the robot executes once.
+    A request without a reply in time is sent again; the robot executes it once.
     """
 
     def __init__(self, line: Line, heard: Callable[[Event], object] = lambda event: None) -> None:
         self.line = line
         self.decoder = Decoder()
-        self.picture = Picture()
+        self.replica = MapReplica()
         self.heard = heard
-        """Called with every event, when the picture has taken it in."""
+        """Called with every event after it was applied to the replica."""
         self.timeout_s = 1.0
         self.attempts = 5
         self._encoder = Encoder()
-        # It should not be the number of the last request of the client before.
+        # It should differ from the last id of the previous client.
         self._next_id = random.randrange(1 << 16)
 
     def listen(self) -> list[Event]:
-        """Reads the line once and takes in what came. EOFError or OSError when the line ends or fails."""
+        """Reads the line once and applies what was received. EOFError or OSError if the line ends or fails."""
         events = self.decoder.feed(self.line.read())
         for event in events:
-            self.picture.apply(event)
+            self.replica.apply(event)
             self.heard(event)
         return events
 
     def request(self, command: AnyCommand) -> AnyOutcome:
-        """Sends a command and waits for what comes of it; a refusal is an outcome. NoReply after the last attempt."""
+        """Sends a command and waits for its outcome; a refusal is an outcome. NoReply after the last attempt."""
         request = Request(self._next_id, command)
         self._next_id = (self._next_id + 1) & 0xFFFF
         for _ in range(self.attempts):
@@ -1223,8 +1257,8 @@ class Client:
 
 
 def main() -> int:
-    """`python -m toposlam_stream LINE`: every event as a line of JSON, and at the end what was counted."""
-    parser = argparse.ArgumentParser(prog="toposlam_stream", description="Prints what a robot says, one JSON object a line.")
+    """`python -m toposlam_stream LINE`: prints every event as a line of JSON, and the counts at the end."""
+    parser = argparse.ArgumentParser(prog="toposlam_stream", description="Prints the messages of a robot, one JSON object per line.")
     parser.add_argument("line", help="tcp:HOST:PORT, a serial port, or a file of raw bytes")
     parser.add_argument("--baud", type=int, default=115_200, help="speed of a serial port (default: %(default)s)")
     arguments = parser.parse_args()

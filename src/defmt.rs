@@ -10,8 +10,8 @@ use crate::ring::drivers::{
     AddressError, BridgeError, HcSr04ConfigError, MaxBotixConfigError, SonarError, SonarFault, Srf08ConfigError,
 };
 use crate::{
-    ConfigError, FaultCounters, FaultKind, Fingerprint, FingerprintError, NgramError, NgramsFull, Observation, Turn,
-    Update, VertexId, VerticesFull, WeightFactors, WorstNgram,
+    ConfigError, FaultCounters, FaultKind, Fingerprint, FingerprintError, MapperError, NgramError, NgramsFull,
+    Observation, PaperFactors, RobustFactors, Turn, Update, VertexId, VerticesFull, WeightFactors, WorstNgram,
 };
 
 /// A text for each variant of an enum without fields.
@@ -174,8 +174,16 @@ impl Format for Update {
 
 impl Format for WeightFactors {
     fn format(&self, f: Formatter<'_>) {
-        let Self { ln_label_q16, ln_consistency_q16, ln_size_q16 } = self;
-        write!(f, "label {=i32}, consistency {=i32}", ln_label_q16, ln_consistency_q16);
+        let ln_size_q16 = match self {
+            Self::Robust(RobustFactors { ln_labels_q16, ln_moves_q16, ln_size_q16 }) => {
+                write!(f, "labels {=i32}, moves {=i32}", ln_labels_q16, ln_moves_q16);
+                ln_size_q16
+            }
+            Self::Paper(PaperFactors { ln_label_q16, ln_consistency_q16, ln_size_q16 }) => {
+                write!(f, "label {=i32}, consistency {=i32}", ln_label_q16, ln_consistency_q16);
+                ln_size_q16
+            }
+        };
         write!(f, ", size {=i32} / 65536 nats", ln_size_q16);
     }
 }
@@ -221,11 +229,19 @@ impl Format for VerticesFull {
     }
 }
 
-/// What only a firmware with the serial protocol logs.
+impl Format for MapperError {
+    fn format(&self, f: Formatter<'_>) {
+        match self {
+            Self::Place(error) => error.format(f),
+            Self::Filter(error) => error.format(f),
+        }
+    }
+}
+
+/// The types of the serial protocol.
 #[cfg(feature = "wire")]
 mod wire {
     use super::{Format, Formatter, write};
-    use crate::MapperError;
     use crate::wire::{EncodeError, QueueFull};
 
     texts!(EncodeError {
@@ -236,15 +252,6 @@ mod wire {
     impl Format for QueueFull {
         fn format(&self, f: Formatter<'_>) {
             write!(f, "the transmit queue has no room for the message");
-        }
-    }
-
-    impl Format for MapperError {
-        fn format(&self, f: Formatter<'_>) {
-            match self {
-                Self::Place(error) => error.format(f),
-                Self::Filter(error) => error.format(f),
-            }
         }
     }
 }

@@ -155,8 +155,8 @@ pub mod wire;
 pub use fault::{FaultCounters, FaultKind};
 pub use filter::{
     Config, ConfigError, Consistency, Direction, Evidence, Filter, FilterCapacities, History, Ngram, NgramError,
-    NgramLength, NgramTable, NgramsFull, Observation, PaperFilter, Particle, Prior, RobustConfig, RobustFilter, Turn,
-    Update, WeightFactors, WorstNgram,
+    NgramLength, NgramTable, NgramsFull, Observation, PaperFactors, PaperFilter, Particle, Prior, RobustConfig,
+    RobustFactors, RobustFilter, Turn, Update, WeightFactors, WorstNgram,
 };
 pub use map::{Map, PerVertex, VertexId, VertexSet, VerticesFull};
 pub use mapper::{Mapper, MapperConfig, MapperError};

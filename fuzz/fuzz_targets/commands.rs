@@ -182,7 +182,7 @@ struct Robot<'buffer> {
     settings: Settings,
     filter: Box<Small>,
     turns: usize,
-    going_to: Option<u8>,
+    goal: Option<u8>,
     paused: bool,
     localise_only: bool,
     expected: Expected,
@@ -199,7 +199,7 @@ impl<'buffer> Robot<'buffer> {
             settings: Settings { filter: CONFIG, place: PLACE, speed_permille: 1000, snapshot_every_places: 25 },
             filter: DRIVEN.clone(),
             turns: 0,
-            going_to: None,
+            goal: None,
             paused: false,
             localise_only: false,
             expected: Expected::default(),
@@ -256,10 +256,10 @@ impl<'buffer> Robot<'buffer> {
                 self.filter.set_localise_only(on);
             }
             Command::GoTo { vertex } if usize::from(vertex) < self.filter.map().vertices().len() => {
-                self.going_to = Some(vertex)
+                self.goal = Some(vertex)
             }
             Command::GoTo { .. } => return Err(Refusal::UnknownVertex),
-            Command::Explore => self.going_to = None,
+            Command::Explore => self.goal = None,
             Command::Pause { on } => self.paused = on,
             _ => return Err(Refusal::Unsupported),
         }
@@ -331,7 +331,7 @@ impl<'buffer> Robot<'buffer> {
             uptime_ms: 1000,
             paused: self.paused,
             localise_only: self.localise_only,
-            going_to: self.going_to,
+            goal: self.goal,
             stored_bytes: 0,
             stored_places_ago: 0,
         }

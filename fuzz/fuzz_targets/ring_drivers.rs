@@ -15,8 +15,8 @@ use toposlam::{
     FaultCounters, FaultKind,
     ring::RingFrame,
     ring::drivers::{
-        AddressError, BridgeError, FiringPlan, HcSr04Config, HcSr04Ring, MaxBotixConfig, MaxBotixRing, MicrosecondClock,
-        Sc18im700, SonarRing, Srf08Config, Srf08Ring, change_maxbotix_address, change_srf08_address,
+        AddressError, BridgeError, FiringPlan, HcSr04Config, HcSr04Ring, MaxBotixConfig, MaxBotixRing,
+        MicrosecondClock, Sc18im700, SonarRing, Srf08Config, Srf08Ring, change_maxbotix_address, change_srf08_address,
     },
 };
 

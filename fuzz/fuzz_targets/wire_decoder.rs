@@ -1,4 +1,4 @@
-//! Any bytes on the line, in any pieces: both decoders, and the listener's picture.
+//! Any bytes on the line, in any pieces: both decoders, and the listener's replica.
 #![no_main]
 
 use std::fmt::Debug;
@@ -6,8 +6,8 @@ use std::fmt::Debug;
 use arbitrary::Arbitrary;
 use libfuzzer_sys::fuzz_target;
 use toposlam::wire::{
-    Arrival, DecodeError, Decoder, DecoderCounters, Encoder, Header, List, MAX_FRAME_BYTES, Message, Payload, Picture,
-    Progress, Renamed, Request, Row,
+    Arrival, DecodeError, Decoder, DecoderCounters, Encoder, Header, List, MAX_FRAME_BYTES, MapReplica, Message,
+    Payload, Progress, Remapped, Request, Row,
 };
 use toposlam_fuzz::line::{Line, Piece};
 
@@ -22,7 +22,7 @@ struct Input<'a> {
 enum Part<'a> {
     /// Anything.
     Any(Piece<'a>),
-    /// A message about the map: it takes several to make a picture wrong.
+    /// A message about the map: it takes several to make a replica wrong.
     Edge {
         a: u8,
         b: u8,
@@ -38,8 +38,8 @@ enum Part<'a> {
     Size {
         vertices: u8,
     },
-    Renamed {
-        names: &'a [u8],
+    Remapped {
+        vertices: &'a [u8],
     },
 }
 
@@ -53,9 +53,10 @@ impl Part<'_> {
                 Message::Row(Row { vertex: near(vertex), radius_mm: 1000, visits: 1, neighbours })
             }
             Self::Size { vertices } => Message::Map { vertices: near(vertices), edges: 0, digest: 0 },
-            Self::Renamed { names } => {
-                Message::Renamed(Renamed { place_index: 0, names: List::new(names.iter().map(|&name| near(name))) })
-            }
+            Self::Remapped { vertices } => Message::Remapped(Remapped {
+                place_index: 0,
+                vertices: List::new(vertices.iter().map(|&vertex| near(vertex))),
+            }),
         };
         line.say(&message)
     }
@@ -163,32 +164,32 @@ fn comes_back<M: Payload + PartialEq + Debug>(message: &M) {
 
 /// Draws the map, which must be one whatever was heard.
 fn draw<const V: usize>(heard: &[Heard<Message>]) {
-    let mut picture = Picture::<V>::new();
+    let mut replica = MapReplica::<V>::new();
     for heard in heard {
         if let Heard::Message(header, message) = heard {
-            picture.apply(*header, message);
+            replica.apply(*header, message);
             if V < 16 {
-                check_picture(&picture);
+                check_picture(&replica);
             }
         }
     }
-    check_picture(&picture);
+    check_picture(&replica);
 }
 
-fn check_picture<const V: usize>(picture: &Picture<V>) {
-    let vertices = picture.vertices();
+fn check_picture<const V: usize>(replica: &MapReplica<V>) {
+    let vertices = replica.vertices();
     assert!(usize::from(vertices) <= V);
     for from in 0..=V as u8 {
-        let row = picture.neighbours(from);
+        let row = replica.neighbours(from);
         for to in (0..64).filter(|to| row >> to & 1 == 1) {
             assert!(from < vertices && to < vertices, "an edge from {from} to {to} of {vertices}");
-            assert!(picture.neighbours(to) >> from & 1 == 1, "the edge from {from} to {to} does not lead back");
+            assert!(replica.neighbours(to) >> from & 1 == 1, "the edge from {from} to {to} does not lead back");
         }
-        let row = picture.row(from);
+        let row = replica.row(from);
         assert!(row.is_none_or(|row| row.vertex == from && from < vertices));
-        assert!(!picture.is_complete() || row.is_some() == (from < vertices));
+        assert!(!replica.is_complete() || row.is_some() == (from < vertices));
     }
-    assert!(picture.edges().all(|(a, b)| a <= b && b < vertices));
+    assert!(replica.edges().all(|(a, b)| a <= b && b < vertices));
     // It must not panic; whether it holds is up to the sender.
-    let _ = picture.is_converged();
+    let _ = replica.is_converged();
 }

@@ -5,7 +5,7 @@ mod common;
 use common::notes::Notes;
 use toposlam::reference::{self, PaperReference, SONARS, VERTICES};
 use toposlam::wire::{
-    Arrival, Belief, Capacities, Header, Hello, Location, Message, Picture, Reporter, ResetCause, Worst,
+    Arrival, Belief, Capacities, Header, Hello, Location, MapReplica, Message, Reporter, ResetCause, Worst,
 };
 use toposlam::{FaultCounters, Filter, Mapper, MapperConfig, Observation, Turn};
 use toposlam_sim::world::{Plan, RobotModel, Simulation};
@@ -52,26 +52,26 @@ fn a_listener_has_what_the_filter_believes<F: Filter<VERTICES>>(settings: F::Con
     let mut reporter = Reporter::new();
     let capacities = Capacities::of_mapper::<SONARS, VERTICES, F>(&config(settings));
     reporter.start(Hello::new(0, ResetCause::Unknown, 1, capacities), 100);
-    let mut picture = Picture::<VERTICES>::new();
+    let mut replica = MapReplica::<VERTICES>::new();
     let mut sequence = 0;
     let mut places = 0;
     for (frame, truth) in simulation() {
         let seen = mapper.observe(&frame, truth.turn);
         reporter.report(&mapper, seen.as_ref(), &FaultCounters::new(), |message: &Message| {
-            picture.apply(Header { sequence, arrival: Arrival::InOrder }, message);
+            replica.apply(Header { sequence, arrival: Arrival::InOrder }, message);
             sequence = sequence.wrapping_add(1);
             Ok(())
         });
         let Some((_, update)) = seen else { continue };
         let filter = mapper.filter();
-        assert!(picture.is_converged(), "place {places}");
-        assert!(picture.edges().eq(filter.map().edges().map(|(a, b)| (a.into(), b.into()))), "place {places}");
-        assert_eq!(picture.location(), Some(Location::from(&update)));
-        assert_eq!(picture.belief(), Some(Belief::of(filter, places)));
-        assert_eq!(picture.worst(), Some(Worst::of(filter, places)));
-        let belief = picture.belief().unwrap();
+        assert!(replica.is_converged(), "place {places}");
+        assert!(replica.edges().eq(filter.map().edges().map(|(a, b)| (a.into(), b.into()))), "place {places}");
+        assert_eq!(replica.location(), Some(Location::from(&update)));
+        assert_eq!(replica.belief(), Some(Belief::of(filter, places)));
+        assert_eq!(replica.worst(), Some(Worst::of(filter, places)));
+        let belief = replica.belief().unwrap();
         assert!((1..=1000).contains(&belief.map_permille), "{belief:?}");
-        let certain: u16 = belief.places.as_slice().iter().map(|place| place.permille).sum();
+        let certain: u16 = belief.vertices.as_slice().iter().map(|place| place.permille).sum();
         assert!((1..=1004).contains(&certain), "{belief:?}");
         places += 1;
         if places == 40 {

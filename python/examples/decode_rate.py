@@ -10,7 +10,7 @@ import sys
 import time
 from pathlib import Path
 
-from toposlam_stream import Decoder, Picture
+from toposlam_stream import Decoder, MapReplica
 
 RUNS = 5
 PIECE_BYTES = 4096
@@ -21,15 +21,15 @@ def main() -> None:
     stream = Path(sys.argv[1]).read_bytes()
     seconds = []
     for _ in range(RUNS):
-        decoder, picture = Decoder(), Picture()
+        decoder, replica = Decoder(), MapReplica()
         begun = time.perf_counter()
         for at in range(0, len(stream), PIECE_BYTES):
             for event in decoder.feed(stream[at : at + PIECE_BYTES]):
-                picture.apply(event)
+                replica.apply(event)
         seconds.append(time.perf_counter() - begun)
     median = statistics.median(seconds)
     frames = decoder.counters.messages
-    print(f"{len(stream)} bytes, {frames} frames, {picture.vertices} vertices, median of {RUNS} runs on one core")
+    print(f"{len(stream)} bytes, {frames} frames, {replica.vertices} vertices, median of {RUNS} runs on one core")
     print(f"{len(stream) / median / 1e6:.2f} MB/s, {frames / median:.0f} frames/s")
 
 

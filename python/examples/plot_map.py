@@ -17,7 +17,7 @@ from pathlib import Path
 
 import matplotlib
 
-from toposlam_stream import DEAD, SILENCE, Decoder, Event, Heard, Line, Picture, Renamed, open_line
+from toposlam_stream import DEAD, SILENCE, Decoder, Event, Heard, Line, MapReplica, Remapped, open_line
 
 SECONDS_A_PICTURE = 0.2
 SILENT_MM = 6000
@@ -31,9 +31,9 @@ class Arrangement:
         self._points: dict[int, complex] = {}
         self._random = random.Random(1)
 
-    def rename(self, renamed: Renamed) -> None:
+    def remap(self, remapped: Remapped) -> None:
         """Lets the vertices keep their places under their new numbers."""
-        named = ((renamed.now(vertex), point) for vertex, point in self._points.items())
+        named = ((remapped.now(vertex), point) for vertex, point in self._points.items())
         self._points = {vertex: point for vertex, point in named if vertex is not None}
 
     def arrange(self, vertices: int, edges: list[tuple[int, int]]) -> dict[int, complex]:
@@ -58,61 +58,61 @@ class Arrangement:
         return points
 
 
-def draw(figure, picture: Picture, arrangement: Arrangement, decoder: Decoder) -> None:
+def draw(figure, replica: MapReplica, arrangement: Arrangement, decoder: Decoder) -> None:
     """Draws all that is known."""
     figure.clear()
     paper = figure.add_subplot(1, 2, 1)
-    points = arrangement.arrange(picture.vertices, picture.edges())
-    for a, b in picture.edges():
+    points = arrangement.arrange(replica.vertices, replica.edges())
+    for a, b in replica.edges():
         if a == b:
             paper.plot(points[a].real, points[a].imag, "o", markersize=26, markerfacecolor="none", color="0.6", zorder=1)
         paper.plot([points[a].real, points[b].real], [points[a].imag, points[b].imag], color="0.6", zorder=1)
     for vertex, point in points.items():
-        row = picture.row(vertex)
-        is_here = picture.location is not None and picture.location.vertex == vertex
+        row = replica.row(vertex)
+        is_here = replica.location is not None and replica.location.vertex == vertex
         area = 120 + (row.radius_mm / 8 if row else 0)
         paper.scatter(point.real, point.imag, s=area, color="tab:red" if is_here else "tab:blue", zorder=2)
         paper.annotate(str(vertex), (point.real, point.imag), color="white", ha="center", va="center", zorder=3)
     paper.set_aspect("equal", adjustable="datalim")
     paper.margins(0.15)
     paper.set_axis_off()
-    state = "as the robot has it" if picture.is_converged() else "it may lack things"
-    paper.set_title(f"{picture.vertices} places, {len(picture.edges())} edges: {state}")
-    draw_surroundings(figure.add_subplot(1, 2, 2, projection="polar"), picture)
+    state = "as the robot has it" if replica.is_converged() else "it may lack things"
+    paper.set_title(f"{replica.vertices} places, {len(replica.edges())} edges: {state}")
+    draw_surroundings(figure.add_subplot(1, 2, 2, projection="polar"), replica)
     figure.suptitle(f"{decoder.counters.messages} messages, {decoder.counters.lost} lost (red: the robot is here)")
 
 
-def draw_surroundings(axes, picture: Picture) -> None:
+def draw_surroundings(axes, replica: MapReplica) -> None:
     """The ranges of sonars that stand evenly, counter-clockwise from straight ahead, without the dead ones; and where the
     drive steers."""
     axes.set_theta_zero_location("N")
     axes.set_rlim(0, SILENT_MM)
-    if picture.drive:
-        bearing = picture.drive.heading_mrad / 1000
-        axes.plot([bearing, bearing], [0, SILENT_MM * picture.drive.speed_permille / 1000], color="tab:red")
-    if picture.ring is None:
+    if replica.velocity:
+        bearing = replica.velocity.heading_mrad / 1000
+        axes.plot([bearing, bearing], [0, SILENT_MM * replica.velocity.speed_permille / 1000], color="tab:red")
+    if replica.ring is None:
         axes.set_title("the robot sends no ring frames; red: its drive")
         return
-    echoes = picture.ring.ranges_mm
+    echoes = replica.ring.ranges_mm
     sonars = [(number, echo) for number, echo in enumerate(echoes) if echo != DEAD]
     bearings = [2 * math.pi * number / len(echoes) for number, _ in sonars]
     ranges_mm = [SILENT_MM if echo == SILENCE else min(echo, SILENT_MM) for _, echo in sonars]
     axes.fill(bearings, ranges_mm, alpha=0.3)
     axes.plot(bearings, ranges_mm, "o")
-    axes.set_title(f"ring frame {picture.ring.frame_index}, mm; red: the drive")
+    axes.set_title(f"ring frame {replica.ring.frame_index}, mm; red: the drive")
 
 
-def listen(line: Line, decoder: Decoder, picture: Picture, arrangement: Arrangement) -> bool:
+def listen(line: Line, decoder: Decoder, replica: MapReplica, arrangement: Arrangement) -> bool:
     """Takes in what has come; false when the line has ended."""
     try:
         events: list[Event] = decoder.feed(line.read())
     except EOFError:
         return False
     for event in events:
-        if isinstance(event, Heard) and isinstance(event.message, Renamed):
+        if isinstance(event, Heard) and isinstance(event.message, Remapped):
             # The vertices that are on the paper, before the map takes their new numbers.
-            arrangement.rename(event.message)
-        picture.apply(event)
+            arrangement.remap(event.message)
+        replica.apply(event)
     return True
 
 
@@ -127,19 +127,19 @@ def main() -> None:
         matplotlib.use("Agg")
     from matplotlib import pyplot
 
-    decoder, picture, arrangement = Decoder(), Picture(), Arrangement()
+    decoder, replica, arrangement = Decoder(), MapReplica(), Arrangement()
     figure = pyplot.figure(figsize=(11, 5.5))
     begun = drawn = time.monotonic()
     with open_line(arguments.line) as line:
-        while listen(line, decoder, picture, arrangement):
+        while listen(line, decoder, replica, arrangement):
             now = time.monotonic()
             if now - begun > arguments.seconds or not (arguments.save or pyplot.fignum_exists(figure.number)):
                 break
             if not arguments.save and now - drawn > SECONDS_A_PICTURE:
-                draw(figure, picture, arrangement, decoder)
+                draw(figure, replica, arrangement, decoder)
                 pyplot.pause(0.001)
                 drawn = now
-    draw(figure, picture, arrangement, decoder)
+    draw(figure, replica, arrangement, decoder)
     if arguments.save:
         figure.savefig(arguments.save)
     elif pyplot.fignum_exists(figure.number):

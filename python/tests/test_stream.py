@@ -35,13 +35,13 @@ from toposlam_stream import (
     Encoder,
     Heard,
     Hello,
-    Journey,
-    JourneyState,
+    GoalStatus,
+    GoalState,
     Line,
     Map,
     NoReply,
     Outcome,
-    Picture,
+    MapReplica,
     Refusal,
     Reply,
     Request,
@@ -69,16 +69,16 @@ def feed_in_pieces(stream: bytes, piece_bytes: int) -> tuple[list[Any], Decoder]
     return [event for piece in pieces for event in decoder.feed(piece)], decoder
 
 
-def picture_json(picture: Picture) -> dict[str, Any]:
-    named = ("hello", "location", "evidence", "health", "belief", "worst", "journey")
+def replica_json(replica: MapReplica) -> dict[str, Any]:
+    named = ("hello", "location", "evidence", "health", "belief", "worst", "goal_status")
     return {
-        "vertices": picture.vertices,
-        "rows": [plain(picture.row(vertex)) for vertex in range(picture.vertices)],
-        "edges": [list(edge) for edge in picture.edges()],
-        "is_converged": picture.is_converged(),
-        "is_complete": picture.is_complete(),
-        "faults": list(picture.faults.values()),
-        **{name: plain(getattr(picture, name)) for name in named},
+        "vertices": replica.vertices,
+        "rows": [plain(replica.row(vertex)) for vertex in range(replica.vertices)],
+        "edges": [list(edge) for edge in replica.edges()],
+        "is_converged": replica.is_converged(),
+        "is_complete": replica.is_complete(),
+        "faults": list(replica.faults.values()),
+        **{name: plain(getattr(replica, name)) for name in named},
     }
 
 
@@ -133,18 +133,18 @@ class Golden(unittest.TestCase):
     def test_every_stream_gives_the_events_counts_and_map_that_the_library_has(self) -> None:
         for record in of_kind("stream"):
             with self.subTest(record["name"]):
-                decoder, picture = Decoder(), Picture()
+                decoder, replica = Decoder(), MapReplica()
                 lines, converged = [], 0
                 events = decoder.feed(bytes.fromhex(record["bytes"]))
                 for event in events:
-                    picture.apply(event)
-                    converged += picture.is_converged()
+                    replica.apply(event)
+                    converged += replica.is_converged()
                     lines.append(json_line(to_json(event)) + "\n")
                 self.assertEqual(dataclasses.asdict(decoder.counters), record["counters"])
                 self.assertEqual(len(events), record["events"])
                 self.assertEqual(zlib.crc32("".join(lines).encode()), record["events_crc32"])
                 self.assertEqual(converged, record["converged"])
-                self.assertEqual(picture_json(picture), record["picture"])
+                self.assertEqual(replica_json(replica), record["replica"])
 
     def test_it_does_not_matter_how_a_stream_is_split(self) -> None:
         for record in of_kind("stream"):
@@ -161,9 +161,9 @@ class Golden(unittest.TestCase):
         for version in (toposlam_stream.PROTOCOL_VERSION, toposlam_stream.FRAME_VERSION):
             self.assertIn(f"version is {version}", specification)
         self.assertIn(f"{toposlam_stream.SCHEMA_HASH:016X}", specification)
-        for kind, requests in (("example", False), ("request", True)):
+        for kind, requests, count in (("example", False, 21), ("request", True, 20)):
             blocks = re.findall(rf"```{kind}\n(.*?)```", specification, re.DOTALL)
-            self.assertEqual(len(blocks), 20)
+            self.assertEqual(len(blocks), count)
             for block in blocks:
                 frame = bytes.fromhex(re.search("frame: (.*)", block)[1])
                 (event,) = Decoder(requests).feed(frame)
@@ -172,7 +172,7 @@ class Golden(unittest.TestCase):
 
 
 class Robustness(unittest.TestCase):
-    def test_no_bytes_make_the_decoder_the_picture_or_the_json_raise(self) -> None:
+    def test_no_bytes_make_the_decoder_the_replica_or_the_json_raise(self) -> None:
         draw = random.Random(1)
         intact = exploration()
         for _ in range(300):
@@ -181,15 +181,15 @@ class Robustness(unittest.TestCase):
             stream = bytearray(intact[at : at + 600])
             for _ in range(draw.randrange(20)):
                 stream[draw.randrange(len(stream))] = draw.choice((0, 1, 2, 127, 128, 255))
-            decoder, picture = Decoder(), Picture()
+            decoder, replica = Decoder(), MapReplica()
             for event in decoder.feed(noise + bytes(stream)):
-                picture.apply(event)
+                replica.apply(event)
                 json_line(to_json(event))
-            self.assertLessEqual(picture.vertices, 64)
+            self.assertLessEqual(replica.vertices, 64)
 
     def test_an_intact_frame_of_any_payload_is_one_message_or_one_error(self) -> None:
         draw = random.Random(2)
-        for version, head, requests in ((1, b"", False), (129, b"\7", True), (129, b"\7\7", True)):
+        for version, head, requests in ((2, b"", False), (130, b"\7", True), (130, b"\7\7", True)):
             heard = []
             for _ in range(3000):
                 rest = bytes(draw.choice((0, 1, 2, 127, 128, 255)) for _ in range(draw.randrange(30)))
@@ -336,7 +336,7 @@ class Commanding(unittest.TestCase):
             for event in ear.feed(data):
                 asked.append(event.message)
                 to_client.append(mouth.encode(Reply(event.message.id ^ 1, Outcome.Done())))
-                to_client.append(mouth.encode(Journey(3, JourneyState.UNDERWAY)))
+                to_client.append(mouth.encode(GoalStatus(3, GoalState.ACTIVE)))
                 if len(asked) > 1:
                     to_client.append(b"\0" + mouth.encode(Reply(event.message.id, Outcome.Refused(Refusal.NO_ROUTE))))
 
@@ -346,7 +346,7 @@ class Commanding(unittest.TestCase):
         self.assertEqual(client.request(Command.GoTo(3)), Outcome.Refused(Refusal.NO_ROUTE))
         self.assertEqual(len(asked), 2)
         self.assertEqual(asked[0], asked[1], "the very same request, so that it is executed once")
-        self.assertEqual(client.picture.journey, Journey(3, JourneyState.UNDERWAY))
+        self.assertEqual(client.replica.goal_status, GoalStatus(3, GoalState.ACTIVE))
         self.assertTrue(any(isinstance(event, Damaged) for event in heard))
         client.request(Command.Explore())
         self.assertNotEqual(asked[2].id, asked[0].id)
@@ -382,9 +382,9 @@ class Commanding(unittest.TestCase):
                     self.assertEqual(client.request(Command.Pause(True)), Outcome.Done())
                     self.assertEqual(client.request(Command.SetConfig(Setting.NOISE_MM, 40)), Outcome.Done())
                     self.assertEqual(client.request(Command.GetMap()), Outcome.Done())
-                    while not client.picture.is_converged():
+                    while not client.replica.is_converged():
                         client.listen()
-                    self.assertIsNone(client.picture.hello.complaint())
+                    self.assertIsNone(client.replica.hello.complaint())
                     self.assertTrue(client.request(Command.Info()).paused)
                     self.assertEqual(client.decoder.counters.unknown_message, 0)
             finally:

@@ -35,7 +35,7 @@ pub struct Update {
     pub is_new: bool,
     /// The distance of Eq. 2, or of the half of it that is configured, in millimetres; `u16::MAX` when it is infinite.
     pub consistency_mm: u16,
-    /// The three factors of the weight.
+    /// The factors of the weight.
     pub factors: WeightFactors,
     /// By how much the weight leads that of every other prediction, at least, as a logarithm in units of 2⁻¹⁶ nats:
     /// predictions that were never proposed count with a bound on their weight. Negative when a heavier one was not
@@ -52,29 +52,67 @@ impl Update {
         vertex: VertexId::FIRST,
         is_new: false,
         consistency_mm: 0,
-        factors: WeightFactors::ONE,
+        factors: WeightFactors::Robust(RobustFactors::ONE),
         lead_q16: 0,
         distinct: 0,
     };
 }
 
-/// The three factors of a weight (Eq. 6), as logarithms in units of 2⁻¹⁶ nats.
+/// The factors of the weight of a hypothesis, one variant for each filter.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct WeightFactors {
-    /// ln of Eq. 7: how well the observation fits the label its vertex had before.
-    pub ln_label_q16: i32,
-    /// ln of Eq. 8: how consistent the map is with the evidence.
-    pub ln_consistency_q16: i32,
-    /// ln of Eq. 9: what the size of the map costs.
-    pub ln_size_q16: i32,
+pub enum WeightFactors {
+    /// Of a [`RobustFilter`].
+    Robust(RobustFactors),
+    /// Of a [`PaperFilter`].
+    Paper(PaperFactors),
 }
 
 impl WeightFactors {
+    /// The logarithm of the weight, the sum of those of its factors, in units of 2⁻¹⁶ nats; saturates.
+    #[must_use]
+    pub const fn ln_weight_q16(&self) -> i32 {
+        let (ln_size, ln_label, ln_rest) = match self {
+            Self::Robust(factors) => (factors.ln_size_q16, factors.ln_labels_q16, factors.ln_moves_q16),
+            Self::Paper(factors) => (factors.ln_size_q16, factors.ln_label_q16, factors.ln_consistency_q16),
+        };
+        ln_size.saturating_add(ln_label).saturating_add(ln_rest)
+    }
+}
+
+/// The factors of the weight of a hypothesis of the robust filter, as natural logarithms in units of 2⁻¹⁶ nats.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct RobustFactors {
+    /// The evidence of the observed labels, with the means and variances of the vertices integrated out.
+    pub ln_labels_q16: i32,
+    /// The evidence of the moves between vertices and of the hints.
+    pub ln_moves_q16: i32,
+    /// The prior of the numbers of vertices and edges.
+    pub ln_size_q16: i32,
+}
+
+impl RobustFactors {
+    /// No evidence.
+    pub(crate) const ONE: Self = Self { ln_labels_q16: 0, ln_moves_q16: 0, ln_size_q16: 0 };
+}
+
+/// The factors of the weight of a particle of the paper's filter (Eq. 6), as natural logarithms in units of 2⁻¹⁶ nats.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct PaperFactors {
+    /// Eq. 7: how well the observation fits the label that its vertex had before.
+    pub ln_label_q16: i32,
+    /// Eq. 8: how consistent the map is with the history.
+    pub ln_consistency_q16: i32,
+    /// Eq. 9: the penalty for similar vertices.
+    pub ln_size_q16: i32,
+}
+
+impl PaperFactors {
     pub(crate) const ONE: Self = Self { ln_label_q16: 0, ln_consistency_q16: 0, ln_size_q16: 0 };
 
-    /// ln of the weight (Eq. 6), in units of 2⁻¹⁶ nats; saturates.
+    /// The logarithm of the weight (Eq. 6) in units of 2⁻¹⁶ nats; saturates.
+    #[must_use]
     pub const fn ln_weight_q16(&self) -> i32 {
-        self.ln_size_q16.saturating_add(self.ln_label_q16).saturating_add(self.ln_consistency_q16)
+        WeightFactors::Paper(*self).ln_weight_q16()
     }
 }
 

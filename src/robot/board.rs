@@ -31,20 +31,20 @@ pub trait Board {
     /// Keeps a snapshot so that it outlasts a loss of power. The robot stands still meanwhile.
     ///
     /// # Errors
-    /// [`KeepError`]; the snapshots before must still be there.
-    fn keep(&mut self, snapshot: &[u8]) -> Result<(), KeepError>;
+    /// [`SaveError`]; the snapshots before must still be there.
+    fn save(&mut self, snapshot: &[u8]) -> Result<(), SaveError>;
 }
 
 /// Why a snapshot was not kept.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum KeepError {
+pub enum SaveError {
     /// The board has nowhere to keep one.
     NoStore,
     /// The flash could not be written or erased.
     Failed,
 }
 
-impl fmt::Display for KeepError {
+impl fmt::Display for SaveError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(match self {
             Self::NoStore => "the board has nowhere to keep a snapshot",
@@ -53,4 +53,4 @@ impl fmt::Display for KeepError {
     }
 }
 
-impl core::error::Error for KeepError {}
+impl core::error::Error for SaveError {}

@@ -3,7 +3,7 @@
 use super::{Board, FRAMES_PER_HELLO, Line, RECEIVED_PER_TURN, Robot, restore, snapshot};
 use crate::drive::{self, Goal};
 use crate::persist::snapshot::Resume;
-use crate::wire::{Command, Info, Journey, JourneyState, Message, Outcome, Refusal, Setting, Settings, Version};
+use crate::wire::{Command, GoalState, GoalStatus, Info, Message, Outcome, Refusal, Setting, Settings, Version};
 use crate::{FaultKind, RobustFilter, VertexId};
 
 /// No way to a vertex was told of.
@@ -55,7 +55,7 @@ impl<const SONARS: usize, const N: usize, const V: usize, const HISTORY: usize> 
     }
 
     fn info(&self, board: &mut impl Board) -> Info {
-        let going_to = match (self.drive.goal(), self.drive.goal_status()) {
+        let goal = match (self.drive.goal(), self.drive.goal_status()) {
             (Goal::Vertex(vertex), drive::GoalStatus::Active) => Some(vertex.into()),
             _ => None,
         };
@@ -66,7 +66,7 @@ impl<const SONARS: usize, const N: usize, const V: usize, const HISTORY: usize> 
             uptime_ms: board.now_ms(),
             paused: self.paused,
             localise_only: self.localise_only,
-            going_to,
+            goal,
             stored_bytes: self.stored_bytes,
             stored_places_ago: if self.stored_bytes == 0 { 0 } else { self.places_since },
         }
@@ -128,8 +128,8 @@ impl<const SONARS: usize, const N: usize, const V: usize, const HISTORY: usize> 
 
     fn set_goal(&mut self, goal: Goal, board: &mut impl Board) {
         if let (Goal::Vertex(vertex), drive::GoalStatus::Active) = self.told {
-            let _ =
-                self.send(&Message::Journey(Journey { vertex: vertex.into(), state: JourneyState::Replaced }), board);
+            let _ = self
+                .send(&Message::GoalStatus(GoalStatus { vertex: vertex.into(), state: GoalState::Replaced }), board);
         }
         self.told = NOTHING;
         self.drive.set_goal(goal);
@@ -138,16 +138,16 @@ impl<const SONARS: usize, const N: usize, const V: usize, const HISTORY: usize> 
     /// Tells how the way to a vertex goes, whenever that has changed.
     pub(super) fn tell_journey(&mut self, board: &mut impl Board) {
         let now = (self.drive.goal(), self.drive.goal_status());
-        let (Goal::Vertex(vertex), journey) = now else { return };
-        let state = match journey {
+        let (Goal::Vertex(vertex), goal_status) = now else { return };
+        let state = match goal_status {
             drive::GoalStatus::Inactive => return,
-            drive::GoalStatus::Active => JourneyState::Underway,
-            drive::GoalStatus::Reached => JourneyState::Arrived,
-            drive::GoalStatus::VertexRemoved => JourneyState::VertexGone,
-            drive::GoalStatus::TimedOut => JourneyState::Lost,
+            drive::GoalStatus::Active => GoalState::Active,
+            drive::GoalStatus::Reached => GoalState::Reached,
+            drive::GoalStatus::VertexRemoved => GoalState::VertexRemoved,
+            drive::GoalStatus::TimedOut => GoalState::TimedOut,
         };
-        let journey = Journey { vertex: vertex.into(), state };
-        if self.told != now && self.send(&Message::Journey(journey), board).is_ok() {
+        let message = Message::GoalStatus(GoalStatus { vertex: vertex.into(), state });
+        if self.told != now && self.send(&message, board).is_ok() {
             self.told = now;
         }
     }

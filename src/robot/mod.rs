@@ -12,7 +12,7 @@
 //! ```
 //! use toposlam::reference::{ROBOT, ReferenceRobot, SNAPSHOT_BYTES, SONARS};
 //! use toposlam::ring::{Echo, RingFrame};
-//! use toposlam::robot::{Board, KeepError};
+//! use toposlam::robot::{Board, SaveError};
 //! use toposlam::{FaultCounters, drive::VelocityCommand, wire::QueueFull};
 //!
 //! /// A board with nothing on it.
@@ -33,8 +33,8 @@
 //!     fn stack_high_water_bytes(&mut self) -> u32 {
 //!         0
 //!     }
-//!     fn keep(&mut self, _snapshot: &[u8]) -> Result<(), KeepError> {
-//!         Err(KeepError::NoStore)
+//!     fn save(&mut self, _snapshot: &[u8]) -> Result<(), SaveError> {
+//!         Err(SaveError::NoStore)
 //!     }
 //! }
 //!
@@ -53,7 +53,7 @@ mod boot;
 mod commands;
 mod config;
 
-pub use board::{Board, KeepError};
+pub use board::{Board, SaveError};
 pub use config::{RobotConfig, RobotError};
 
 use crate::drive::{Drive, Goal, GoalStatus, VelocityCommand};
@@ -178,7 +178,7 @@ impl<'buffer, const SONARS: usize, const N: usize, const V: usize, const HISTORY
                 uptime_ms: board.now_ms(),
                 loop_count: self.turns,
                 stack_high_water_bytes: board.stack_high_water_bytes(),
-                worst_update_us: self.worst_turn_ms.saturating_mul(1000),
+                worst_turn_us: self.worst_turn_ms.saturating_mul(1000),
             };
             // A message that finds no room is counted; the next one comes.
             let _ = self.send(&Message::Health(health), board);
@@ -225,14 +225,14 @@ impl<'buffer, const SONARS: usize, const N: usize, const V: usize, const HISTORY
     #[inline(never)]
     fn keep_snapshot(&mut self, board: &mut impl Board) {
         let Self { mapper, drive, staging, .. } = self;
-        let kept = staging.take(|buffer| snapshot(mapper, drive, buffer).ok()).map(|()| board.keep(staging.taken()));
+        let kept = staging.take(|buffer| snapshot(mapper, drive, buffer).ok()).map(|()| board.save(staging.taken()));
         match kept {
             Ok(Ok(())) => {
                 self.stored_bytes = u16::try_from(self.staging.taken().len()).unwrap_or(u16::MAX);
                 self.places_since = 0;
             }
-            Ok(Err(KeepError::NoStore)) => {}
-            Ok(Err(KeepError::Failed)) | Err(_) => self.faults.record(FaultKind::StoreFailed),
+            Ok(Err(SaveError::NoStore)) => {}
+            Ok(Err(SaveError::Failed)) | Err(_) => self.faults.record(FaultKind::StoreFailed),
         }
     }
 
@@ -274,13 +274,13 @@ impl<'buffer, const SONARS: usize, const N: usize, const V: usize, const HISTORY
     }
 
     fn tell_drive(&mut self, velocity: VelocityCommand, board: &mut impl Board) {
-        let drive = wire::Drive {
+        let drive = wire::Velocity {
             frame_index: self.turns,
             heading_mrad: velocity.heading_mrad,
             speed_permille: velocity.speed_permille.min(i16::MAX as u16) as i16,
             state: self.drive.state() as u8,
         };
-        let _ = self.send(&Message::Drive(drive), board);
+        let _ = self.send(&Message::Velocity(drive), board);
     }
 
     fn send(&mut self, message: &Message, board: &mut impl Board) -> Result<(), QueueFull> {

@@ -7,7 +7,7 @@ use crate::checksum::CRC;
 
 /// The version of the frame layout and of everything that could break an old listener; the first byte of every frame. In a
 /// frame to the robot its top bit is set, so that a line that echoes what the robot says gives no commands.
-pub const FRAME_VERSION: u8 = 1;
+pub const FRAME_VERSION: u8 = 2;
 
 /// The version and the sequence number.
 pub(super) const HEADER_BYTES: usize = 3;

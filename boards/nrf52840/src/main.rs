@@ -40,7 +40,7 @@ use toposlam::{
     persist::store::{BootPolicy, Store},
     reference::{ROBOT, ReferenceRobot, SNAPSHOT_BYTES, SONARS},
     ring::drivers::{SonarRing, Srf08Config, Srf08Ring},
-    robot::{Board, KeepError, RobotConfig},
+    robot::{Board, SaveError, RobotConfig},
     wire::{QueueFull, ResetCause},
 };
 
@@ -85,9 +85,9 @@ impl Board for Nrf52840<'_> {
         stack::stack_high_water_bytes()
     }
 
-    fn keep(&mut self, snapshot: &[u8]) -> Result<(), KeepError> {
-        let store = self.store.as_mut().ok_or(KeepError::NoStore)?;
-        store.save(snapshot).map_err(|_| KeepError::Failed)
+    fn save(&mut self, snapshot: &[u8]) -> Result<(), SaveError> {
+        let store = self.store.as_mut().ok_or(SaveError::NoStore)?;
+        store.save(snapshot).map_err(|_| SaveError::Failed)
     }
 }
 

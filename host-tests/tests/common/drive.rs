@@ -1,7 +1,9 @@
 //! A core filter and the reference filter side by side, on the same observations and the same random draws.
 
 use super::{fingerprint, length};
-use toposlam::{Config, Direction, FaultKind, Fingerprint, PaperFilter, Particle as CoreParticle, Prior, Update};
+use toposlam::{
+    Config, Direction, FaultKind, Fingerprint, PaperFilter, Particle as CoreParticle, Prior, Update, WeightFactors,
+};
 use toposlam_host_tests::filter::{self, Candidate, Map, Parameters, Particle};
 use toposlam_host_tests::graph::Graph;
 use toposlam_host_tests::ngram::NgramSet;
@@ -272,7 +274,7 @@ impl Drive {
         let heaviest = of_chosen[of_chosen.len() - 1];
         let difference = nats(best.factors.ln_weight_q16()) - heaviest.ln_weight();
         assert!(difference.abs() <= self.tolerance_of_weight(heaviest), "{update:?} {difference}");
-        assert_eq!((update.vertex, update.factors), (best.at, best.factors));
+        assert_eq!((update.vertex, update.factors), (best.at, WeightFactors::Paper(best.factors)));
         // The lead that is told is a bound on the true one, at which the rivals are as near to the evidence as any.
         let proposals = filter::proposals(pool, LEAST_PROPOSAL * 1.1);
         let rivals = || {

@@ -4,7 +4,8 @@ use toposlam::persist::Persist;
 use toposlam::persist::snapshot::{Reader, SnapshotError, Writer};
 use toposlam::reference::VERTICES;
 use toposlam::{
-    ConfigError, FaultCounters, Filter, FilterCapacities, Map, Observation, Update, VertexId, WeightFactors, WorstNgram,
+    ConfigError, FaultCounters, Filter, FilterCapacities, Map, Observation, RobustFactors, Update, VertexId,
+    WeightFactors, WorstNgram,
 };
 
 /// What a mapper told its filter. Started with the capacity of its history, which a snapshot of it holds; 0 is out of range.
@@ -41,7 +42,7 @@ impl Filter<VERTICES> for Notes {
             vertex: VertexId::FIRST,
             is_new: false,
             consistency_mm: 0,
-            factors: WeightFactors { ln_label_q16: 0, ln_consistency_q16: 0, ln_size_q16: 0 },
+            factors: WeightFactors::Robust(RobustFactors { ln_labels_q16: 0, ln_moves_q16: 0, ln_size_q16: 0 }),
             lead_q16: 0,
             distinct: 1,
         }

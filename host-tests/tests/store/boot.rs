@@ -5,7 +5,7 @@ use toposlam::drive::VelocityCommand;
 use toposlam::persist::snapshot::SnapshotError;
 use toposlam::persist::store::{BootOutcome, BootPolicy, BootReport, StoreError, resume};
 use toposlam::reference::ReferenceRobot;
-use toposlam::robot::{Board, KeepError, RobotConfig};
+use toposlam::robot::{Board, RobotConfig, SaveError};
 use toposlam::wire::{Decoder, Message, Progress, QueueFull};
 use toposlam::{FaultCounters, Filter};
 use toposlam_sim::chip::{Cut, Tear};
@@ -104,8 +104,8 @@ impl Board for Line {
         0
     }
 
-    fn keep(&mut self, _: &[u8]) -> Result<(), KeepError> {
-        Err(KeepError::NoStore)
+    fn save(&mut self, _: &[u8]) -> Result<(), SaveError> {
+        Err(SaveError::NoStore)
     }
 }
 

@@ -47,7 +47,7 @@ fn what_is_set_is_what_the_robot_says_of_itself() {
     client.order(Command::LocaliseOnly { on: true }).unwrap();
     client.order(Command::Pause { on: true }).unwrap();
     let info = client.info().unwrap();
-    assert_eq!((info.paused, info.localise_only, info.going_to), (true, true, None));
+    assert_eq!((info.paused, info.localise_only, info.goal), (true, true, None));
     assert_eq!((info.version, info.boot, info.reset_cause), (Version::LIBRARY, 17, ResetCause::BrownOut));
     client.order(Command::SetConfig(Setting::NoiseMm(77))).unwrap();
     assert_eq!(robot.borrow().settings.filter.noise_mm, 77);
@@ -65,12 +65,12 @@ fn the_map_comes_when_it_is_asked_for() {
     let vertices = robot.borrow().mapper.map().vertices().len();
     assert!(vertices > 4, "{vertices} vertices");
     let turns = robot.borrow().said.len();
-    let picture = client.map().unwrap();
+    let replica = client.map().unwrap();
     let robot = robot.borrow();
-    assert!(picture.edges().eq(robot.mapper.map().edges().map(|(a, b)| (a.into(), b.into()))));
-    assert_eq!(usize::from(picture.vertices()), robot.mapper.map().vertices().len());
-    assert!(robot.said.len() - turns < vertices + 20, "no more than the picture was sent");
-    assert!(picture.hello().is_some());
+    assert!(replica.edges().eq(robot.mapper.map().edges().map(|(a, b)| (a.into(), b.into()))));
+    assert_eq!(usize::from(replica.vertices()), robot.mapper.map().vertices().len());
+    assert!(robot.said.len() - turns < vertices + 20, "no more than the replica was sent");
+    assert!(replica.hello().is_some());
 }
 
 #[test]
@@ -80,10 +80,10 @@ fn a_reset_robot_tells_that_every_vertex_is_gone() {
         robot.borrow_mut().turn(&[]);
     }
     client.map().unwrap();
-    assert!(client.listener().picture().vertices() > 4 && client.listener().picture().location().is_some());
+    assert!(client.listener().replica().vertices() > 4 && client.listener().replica().location().is_some());
     client.order(Command::Reset).unwrap();
     client.info().unwrap();
-    assert_eq!((client.listener().picture().vertices(), client.listener().picture().location()), (0, None));
+    assert_eq!((client.listener().replica().vertices(), client.listener().replica().location()), (0, None));
     assert_eq!(usize::from(client.map().unwrap().vertices()), robot.borrow().mapper.map().vertices().len());
 }
 

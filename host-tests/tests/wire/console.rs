@@ -26,7 +26,7 @@ pub(crate) struct FakeRobot {
     encoder: Encoder,
     paused: bool,
     localise_only: bool,
-    going_to: Option<u8>,
+    goal: Option<u8>,
     pub(crate) executed: Vec<Command>,
     snapshots_taken: u8,
     pub(crate) restored: Vec<u8>,
@@ -55,7 +55,7 @@ impl FakeRobot {
             encoder: Encoder::new(0),
             paused: false,
             localise_only: false,
-            going_to: None,
+            goal: None,
             executed: Vec::new(),
             snapshots_taken: 0,
             restored: Vec::new(),
@@ -119,10 +119,10 @@ impl FakeRobot {
             Command::SetConfig(setting) => self.settings = self.settings.with(setting, HYPOTHESES, SONARS)?,
             Command::LocaliseOnly { on } => self.localise_only = on,
             Command::GoTo { vertex } if usize::from(vertex) < self.mapper.map().vertices().len() => {
-                self.going_to = Some(vertex)
+                self.goal = Some(vertex)
             }
             Command::GoTo { .. } => return Err(Refusal::UnknownVertex),
-            Command::Explore => self.going_to = None,
+            Command::Explore => self.goal = None,
             Command::Pause { on } => self.paused = on,
             _ => return Err(Refusal::Unsupported),
         }
@@ -137,7 +137,7 @@ impl FakeRobot {
             uptime_ms: 1000,
             paused: self.paused,
             localise_only: self.localise_only,
-            going_to: self.going_to,
+            goal: self.goal,
             stored_bytes: 0,
             stored_places_ago: 0,
         }

@@ -3,8 +3,8 @@
 use super::robot::{Random, Robot, TICKS_PER_HELLO};
 use super::{frame, vertex};
 use toposlam::wire::{
-    Belief, Decoder, Evidence, List, Location, Message, Picture, PlaceProbability, Progress, QueueFull, Renamed, Worst,
-    map_digest,
+    Belief, Decoder, Evidence, List, Location, MapReplica, Message, Progress, QueueFull, Remapped, VertexProbability,
+    Worst, map_digest,
 };
 use toposlam::{FaultCounters, FaultKind, Fingerprint, Map, Update, VertexId, WorstNgram};
 
@@ -13,12 +13,12 @@ const V: usize = 16;
 /// A listener, and whether it agrees with a robot.
 struct Listener<const V: usize> {
     decoder: Decoder,
-    picture: Picture<V>,
+    replica: MapReplica<V>,
 }
 
 impl<const V: usize> Listener<V> {
     fn new() -> Self {
-        Self { decoder: Decoder::new(), picture: Picture::new() }
+        Self { decoder: Decoder::new(), replica: MapReplica::new() }
     }
 
     fn hear(&mut self, mut bytes: &[u8]) {
@@ -27,7 +27,7 @@ impl<const V: usize> Listener<V> {
                 Progress::NeedsMore => return,
                 Progress::Error { rest, .. } => rest,
                 Progress::Message { header, message, rest } => {
-                    self.picture.apply(header, &message);
+                    self.replica.apply(header, &message);
                     rest
                 }
             };
@@ -35,13 +35,13 @@ impl<const V: usize> Listener<V> {
     }
 }
 
-/// Whether the picture is the map, vertex by vertex and edge by edge (not by the digest).
-fn same<const V: usize, const W: usize>(picture: &Picture<W>, map: &Map<V>) -> bool {
-    usize::from(picture.vertices()) == map.vertices().len()
-        && picture.is_complete()
-        && picture.edges().eq(map.edges().map(|(a, b)| (a.into(), b.into())))
+/// Whether the replica is the map, vertex by vertex and edge by edge (not by the digest).
+fn same<const V: usize, const W: usize>(replica: &MapReplica<W>, map: &Map<V>) -> bool {
+    usize::from(replica.vertices()) == map.vertices().len()
+        && replica.is_complete()
+        && replica.edges().eq(map.edges().map(|(a, b)| (a.into(), b.into())))
         && map.vertices().all(|vertex| {
-            picture.row(vertex.into()).is_some_and(|row| {
+            replica.row(vertex.into()).is_some_and(|row| {
                 Some(row.radius_mm) == map.label(vertex).map(Fingerprint::radius_mm)
                     && row.visits == map.visits(vertex)
                     && row.neighbours == map.neighbours(vertex).bits()
@@ -59,13 +59,13 @@ fn a_listener_from_the_start_has_the_map_after_every_place() {
         for frame in robot.place(&mut random) {
             listener.hear(&frame);
         }
-        // A row with many changes goes out whole, so nothing waits for the rolling picture.
-        assert!(listener.picture.is_converged(), "place {step}");
-        assert!(same(&listener.picture, &robot.filter.map), "place {step}");
-        assert_eq!(listener.picture.location(), Some(Location::from(&Update { place_index: step, ..robot.update() })));
-        assert_eq!(listener.picture.evidence().map(|evidence| evidence.place_index), Some(step));
-        assert_eq!(listener.picture.belief(), Some(Belief::of(&robot.filter, step)));
-        assert_eq!(listener.picture.worst(), Some(Worst::of(&robot.filter, step)));
+        // A row with many changes goes out whole, so nothing waits for the rolling replica.
+        assert!(listener.replica.is_converged(), "place {step}");
+        assert!(same(&listener.replica, &robot.filter.map), "place {step}");
+        assert_eq!(listener.replica.location(), Some(Location::from(&Update { place_index: step, ..robot.update() })));
+        assert_eq!(listener.replica.evidence().map(|evidence| evidence.place_index), Some(step));
+        assert_eq!(listener.replica.belief(), Some(Belief::of(&robot.filter, step)));
+        assert_eq!(listener.replica.worst(), Some(Worst::of(&robot.filter, step)));
     }
 }
 
@@ -139,11 +139,11 @@ fn a_merge_and_new_numbers_take_one_message_and_what_the_merge_itself_changes() 
         listener.hear(&frame(&mut robot.encoder, message));
         Ok(())
     });
-    let Message::Renamed(renamed) = told[0] else { panic!("{told:?}") };
-    assert_eq!(renamed.names.as_slice(), [2, 1, 0, 1]);
+    let Message::Remapped(renamed) = told[0] else { panic!("{told:?}") };
+    assert_eq!(renamed.vertices.as_slice(), [2, 1, 0, 1]);
     assert_eq!(told[1], Message::Vertex { vertex: 1, radius_mm: 600, visits: 2 });
     assert!(matches!(told[2], Message::Map { vertices: 3, edges: 2, .. }), "{told:?}");
-    assert!(listener.picture.is_converged() && same(&listener.picture, &robot.filter.map));
+    assert!(listener.replica.is_converged() && same(&listener.replica, &robot.filter.map));
 }
 
 #[test]
@@ -154,32 +154,32 @@ fn everything_that_was_heard_of_a_vertex_follows_its_new_number() {
         WorstNgram { distance_mm: 50, length: 3, newest_age: 1, vertices: [3, 2, 1, 0, 0, 0, 0].map(vertex) };
     robot.place(&mut Random(0)).iter().for_each(|frame| listener.hear(frame));
     let rename = |listener: &mut Listener<V>, robot: &mut Robot<V>, names: &[u8]| {
-        let renamed = Renamed { place_index: 2, names: List::new(names.iter().copied()) };
-        listener.hear(&frame(&mut robot.encoder, &Message::Renamed(renamed)));
+        let renamed = Remapped { place_index: 2, vertices: List::new(names.iter().copied()) };
+        listener.hear(&frame(&mut robot.encoder, &Message::Remapped(renamed)));
     };
     let likely = |listener: &Listener<V>| -> Vec<(u8, u16)> {
-        let belief = listener.picture.belief().expect("it was told");
-        belief.places.as_slice().iter().map(|&PlaceProbability { vertex, permille }| (vertex, permille)).collect()
+        let belief = listener.replica.belief().expect("it was told");
+        belief.vertices.as_slice().iter().map(|&VertexProbability { vertex, permille }| (vertex, permille)).collect()
     };
     assert_eq!(likely(&listener), [(2, 667), (1, 167), (3, 167)]);
     // 1 and 3 are one now, with number 0; 0 has number 1.
     rename(&mut listener, &mut robot, &[1, 0, 2, 0]);
-    assert_eq!(listener.picture.location().map(|location| location.vertex), Some(2));
+    assert_eq!(listener.replica.location().map(|location| location.vertex), Some(2));
     assert_eq!(likely(&listener), [(2, 667), (0, 334)]);
-    assert_eq!(listener.picture.worst().map(|worst| worst.vertices), Some(List::new([0, 2, 0])));
-    assert_eq!(listener.picture.edges().collect::<Vec<_>>(), [(0, 1), (0, 2)]);
-    assert_eq!(listener.picture.row(0).map(|row| row.radius_mm), Some(400));
-    assert_eq!(listener.picture.vertices(), 3);
-    assert!(!listener.picture.is_converged());
+    assert_eq!(listener.replica.worst().map(|worst| worst.vertices), Some(List::new([0, 2, 0])));
+    assert_eq!(listener.replica.edges().collect::<Vec<_>>(), [(0, 1), (0, 2)]);
+    assert_eq!(listener.replica.row(0).map(|row| row.radius_mm), Some(400));
+    assert_eq!(listener.replica.vertices(), 3);
+    assert!(!listener.replica.is_converged());
     // The vertex of the location is gone, and with it what was said of it.
     rename(&mut listener, &mut robot, &[0, 1, 255]);
-    assert_eq!((listener.picture.location(), listener.picture.worst()), (None, None));
+    assert_eq!((listener.replica.location(), listener.replica.worst()), (None, None));
     assert_eq!(likely(&listener), [(0, 334)]);
-    assert_eq!(listener.picture.vertices(), 2);
+    assert_eq!(listener.replica.vertices(), 2);
 }
 
 #[test]
-fn a_listener_that_lost_the_new_numbers_has_the_map_after_one_round_of_the_rolling_picture() {
+fn a_listener_that_lost_the_new_numbers_has_the_map_after_one_round_of_the_repeated_map() {
     let mut random = Random(5);
     for _ in 0..200 {
         let mut robot = Robot::<V>::new(1);
@@ -194,12 +194,12 @@ fn a_listener_that_lost_the_new_numbers_has_the_map_after_one_round_of_the_rolli
         for _ in 0..robot.filter.map.vertices().len() + 4 {
             robot.tick(&mut random).iter().for_each(|frame| listener.hear(frame));
         }
-        assert!(listener.picture.is_converged() && same(&listener.picture, &robot.filter.map));
+        assert!(listener.replica.is_converged() && same(&listener.replica, &robot.filter.map));
     }
 }
 
 #[test]
-fn a_late_listener_has_everything_after_one_round_of_the_rolling_picture() {
+fn a_late_listener_has_everything_after_one_round_of_the_repeated_map() {
     let mut random = Random(4);
     for joined_at in 0..100 {
         let mut robot = Robot::<V>::new(1);
@@ -213,21 +213,21 @@ fn a_late_listener_has_everything_after_one_round_of_the_rolling_picture() {
         }
         let mut listener = Listener::<V>::new();
         for _ in 0..robot.filter.map.vertices().len() + 4 {
-            assert!(!listener.picture.is_converged() || same(&listener.picture, &robot.filter.map));
+            assert!(!listener.replica.is_converged() || same(&listener.replica, &robot.filter.map));
             for frame in robot.tick(&mut random) {
                 listener.hear(&frame);
             }
         }
-        assert!(listener.picture.is_converged() && same(&listener.picture, &robot.filter.map), "joined at {joined_at}");
-        assert_eq!(listener.picture.location().map(|location| location.vertex), Some(robot.filter.location.into()));
-        assert_eq!(listener.picture.belief(), Some(Belief::of(&robot.filter, robot.place_index - 1)));
-        assert_eq!(listener.picture.fault(FaultKind::BusError), 1);
+        assert!(listener.replica.is_converged() && same(&listener.replica, &robot.filter.map), "joined at {joined_at}");
+        assert_eq!(listener.replica.location().map(|location| location.vertex), Some(robot.filter.location.into()));
+        assert_eq!(listener.replica.belief(), Some(Belief::of(&robot.filter, robot.place_index - 1)));
+        assert_eq!(listener.replica.fault(FaultKind::BusError), 1);
         for _ in 0..TICKS_PER_HELLO {
             for frame in robot.tick(&mut random) {
                 listener.hear(&frame);
             }
         }
-        assert!(listener.picture.hello().is_some_and(|hello| hello.check().is_ok()));
+        assert!(listener.replica.hello().is_some_and(|hello| hello.check().is_ok()));
     }
 }
 
@@ -251,14 +251,14 @@ fn hold_to_its_word(seed: u64, refused_percent: usize, mut line: impl FnMut(&mut
         }
         listener.hear(&[0]);
         listener.hear(closing);
-        assert!(!listener.picture.is_converged() || same(&listener.picture, &robot.filter.map), "seed {seed}");
+        assert!(!listener.replica.is_converged() || same(&listener.replica, &robot.filter.map), "seed {seed}");
         for _ in 0..30 {
             for frame in robot.tick(&mut random) {
                 listener.hear(&line(&mut random, frame));
-                assert!(!listener.picture.is_converged() || same(&listener.picture, &robot.filter.map), "seed {seed}");
+                assert!(!listener.replica.is_converged() || same(&listener.replica, &robot.filter.map), "seed {seed}");
             }
             ticks += 1;
-            converged += usize::from(listener.picture.is_converged());
+            converged += usize::from(listener.replica.is_converged());
         }
     }
     robot.refused_percent = 0;
@@ -269,7 +269,7 @@ fn hold_to_its_word(seed: u64, refused_percent: usize, mut line: impl FnMut(&mut
         }
     }
     assert!(
-        listener.picture.is_converged() && same(&listener.picture, &robot.filter.map),
+        listener.replica.is_converged() && same(&listener.replica, &robot.filter.map),
         "once the line is good again"
     );
     100 * converged / ticks
@@ -324,23 +324,23 @@ fn overtaken_frames_are_ignored_and_the_map_still_comes() {
         for _ in 0..robot.filter.map.vertices().len() + 4 {
             robot.tick(&mut random).iter().for_each(|frame| listener.hear(frame));
         }
-        assert!(listener.picture.is_converged() && same(&listener.picture, &robot.filter.map));
+        assert!(listener.replica.is_converged() && same(&listener.replica, &robot.filter.map));
     }
 }
 
 #[test]
-fn a_robot_that_starts_anew_begins_with_an_empty_picture() {
+fn a_robot_that_starts_anew_begins_with_an_empty_map() {
     let mut random = Random(61);
     let mut listener = Listener::<V>::new();
     let mut robot = Robot::<V>::new(1);
     robot.change_hypothesis(&mut random);
     robot.tick(&mut random).iter().for_each(|frame| listener.hear(frame));
     robot.place(&mut random).iter().for_each(|frame| listener.hear(frame));
-    assert!(listener.picture.is_converged());
+    assert!(listener.replica.is_converged());
     let mut robot = Robot::<V>::new(2);
     robot.tick(&mut random).iter().for_each(|frame| listener.hear(frame));
-    assert_eq!((listener.picture.vertices(), listener.picture.location()), (0, None));
-    assert!(listener.picture.is_converged());
+    assert_eq!((listener.replica.vertices(), listener.replica.location()), (0, None));
+    assert!(listener.replica.is_converged());
 }
 
 #[test]
@@ -356,11 +356,11 @@ fn a_map_of_64_vertices_arrives_whole() {
     }
     let mut listener = Listener::<64>::new();
     robot.place(&mut random).iter().for_each(|frame| listener.hear(frame));
-    assert!(listener.picture.is_converged() && same(&listener.picture, &robot.filter.map));
+    assert!(listener.replica.is_converged() && same(&listener.replica, &robot.filter.map));
 }
 
 #[test]
-fn the_whole_picture_goes_out_in_a_quarter_of_the_ticks_and_then_at_the_usual_pace() {
+fn the_whole_map_is_sent_in_a_quarter_of_the_ticks_and_then_at_the_usual_pace() {
     let mut random = Random(11);
     let mut robot = Robot::<V>::new(1);
     while robot.filter.map.vertices().len() < 14 {

@@ -3,7 +3,7 @@
 use super::samples::{largest, typical};
 use super::{Heard, frame, hear};
 use proptest::prelude::*;
-use toposlam::wire::{Decoder, Encoder, MAX_FRAME_BYTES, Message};
+use toposlam::wire::{Decoder, Encoder, FRAME_VERSION, MAX_FRAME_BYTES, Message};
 
 /// A stream of frames, and where each frame ends.
 fn stream() -> (Vec<Message>, Vec<u8>, Vec<usize>) {
@@ -129,10 +129,17 @@ fn every_kind_of_damage_is_counted_as_what_it_is() {
     too_long.push(0);
     let mut decoder = Decoder::new();
     let mut heard = Heard::default();
-    for bytes in [&corrupt, &cut, &too_long, &with_crc(&[2, 0, 0, 4, 1, 2, 1]), &with_crc(&[1, 0, 0, 0x7F]), &good] {
+    for bytes in [
+        &corrupt,
+        &cut,
+        &too_long,
+        &with_crc(&[FRAME_VERSION + 1, 0, 0, 4, 1, 2, 1]),
+        &with_crc(&[FRAME_VERSION, 0, 0, 0x7F]),
+        &good,
+    ] {
         heard.hear(&mut decoder, bytes);
     }
-    let trailing = with_crc(&[1, 1, 0, 4, 1, 2, 1, 9]);
+    let trailing = with_crc(&[FRAME_VERSION, 1, 0, 4, 1, 2, 1, 9]);
     heard.hear(&mut decoder, &trailing);
     heard.hear(&mut decoder, &frame(&mut Encoder::new(2), &edge));
     let counters = decoder.counters();
@@ -153,7 +160,7 @@ proptest! {
 
     #[test]
     fn an_intact_frame_of_any_payload_is_one_message_or_one_error(payload in proptest::collection::vec(any::<u8>(), 0..103)) {
-        let heard = hear(&with_crc(&[&[1, 0, 0], &payload[..]].concat()));
+        let heard = hear(&with_crc(&[&[FRAME_VERSION, 0, 0], &payload[..]].concat()));
         prop_assert_eq!(heard.messages.len() + heard.errors, 1);
     }
 }

@@ -8,7 +8,7 @@ use std::path::Path;
 use serde_json::{Value, json};
 use toposlam::FaultKind;
 use toposlam::reference::SNAPSHOT_BYTES;
-use toposlam::wire::{DecoderCounters, Echoes, Encoder, Message, Picture, Request, crc32};
+use toposlam::wire::{DecoderCounters, Echoes, Encoder, MapReplica, Message, Request, crc32};
 use toposlam_link::json;
 use toposlam_link::listener::{Event, Listener};
 use toposlam_sim::exploration::Exploration;
@@ -86,9 +86,9 @@ fn assert_the_streams_show_everything(records: &[Value]) {
     for counter in ["lost", "corrupt", "cut", "too_long", "unknown_version", "unknown_message"] {
         assert!(streams.iter().filter(|stream| stream["counters"][counter] != 0).count() > 1, "no {counter}");
     }
-    assert_eq!(streams[0]["picture"]["is_converged"], true, "{}", streams[0]["picture"]);
-    assert_eq!(streams[0]["picture"]["is_complete"], true);
-    assert!(streams[0]["picture"]["edges"].as_array().unwrap().len() > 4, "{}", streams[0]["picture"]);
+    assert_eq!(streams[0]["replica"]["is_converged"], true, "{}", streams[0]["replica"]);
+    assert_eq!(streams[0]["replica"]["is_complete"], true);
+    assert!(streams[0]["replica"]["edges"].as_array().unwrap().len() > 4, "{}", streams[0]["replica"]);
 }
 
 /// A message and its frame.
@@ -111,7 +111,7 @@ fn stream(name: &str, bytes: &[u8]) -> Value {
     let (mut events, mut converged, mut lines) = (0, 0, String::new());
     listener.feed(bytes, |listener, event| {
         events += 1;
-        converged += u32::from(listener.picture().is_converged());
+        converged += u32::from(listener.replica().is_converged());
         lines += &format!("{}\n", json::event(event));
     });
     let DecoderCounters { messages, lost, corrupt, cut, too_long, unknown_version, unknown_message } =
@@ -127,25 +127,25 @@ fn stream(name: &str, bytes: &[u8]) -> Value {
             "messages": messages, "lost": lost, "corrupt": corrupt, "cut": cut, "too_long": too_long,
             "unknown_version": unknown_version, "unknown_message": unknown_message,
         },
-        "picture": picture_json(listener.picture()),
+        "replica": replica_json(listener.replica()),
     })
 }
 
-fn picture_json(picture: &Picture<64>) -> Value {
+fn replica_json(replica: &MapReplica<64>) -> Value {
     json!({
-        "vertices": picture.vertices(),
-        "rows": (0..picture.vertices()).map(|vertex| picture.row(vertex)).collect::<Vec<_>>(),
-        "edges": picture.edges().collect::<Vec<_>>(),
-        "is_converged": picture.is_converged(),
-        "is_complete": picture.is_complete(),
-        "hello": picture.hello(),
-        "location": picture.location(),
-        "evidence": picture.evidence(),
-        "health": picture.health(),
-        "belief": picture.belief(),
-        "worst": picture.worst(),
-        "journey": picture.journey(),
-        "faults": FaultKind::ALL.map(|kind| picture.fault(kind)),
+        "vertices": replica.vertices(),
+        "rows": (0..replica.vertices()).map(|vertex| replica.row(vertex)).collect::<Vec<_>>(),
+        "edges": replica.edges().collect::<Vec<_>>(),
+        "is_converged": replica.is_converged(),
+        "is_complete": replica.is_complete(),
+        "hello": replica.hello(),
+        "location": replica.location(),
+        "evidence": replica.evidence(),
+        "health": replica.health(),
+        "belief": replica.belief(),
+        "worst": replica.worst(),
+        "goal_status": replica.goal_status(),
+        "faults": FaultKind::ALL.map(|kind| replica.fault(kind)),
     })
 }
 
@@ -156,7 +156,7 @@ fn explore() -> Vec<Vec<u8>> {
     let mut exploration = Exploration::start(&plan, RobotModel::default().with_noise(2.0), 3, &mut buffer).unwrap();
     let (mut encoder, mut frames) = (Encoder::new(0), Vec::new());
     let mut listener = Listener::new();
-    while exploration.places() < 12 || !listener.picture().is_converged() || !listener.picture().is_complete() {
+    while exploration.places() < 12 || !listener.replica().is_converged() || !listener.replica().is_complete() {
         exploration.board().sent.clear();
         let ring = exploration.frame();
         let is_place = exploration.map(&ring).is_some();
@@ -171,7 +171,7 @@ fn explore() -> Vec<Vec<u8>> {
         }
         for message in messages {
             let is_shown = match message {
-                Message::Drive(_) => turn % 400 == 0,
+                Message::Velocity(_) => turn % 400 == 0,
                 _ => is_place || turn % 32 < 2,
             };
             if is_shown || frames.is_empty() {

@@ -1,4 +1,4 @@
-//! The serial protocol: frames, decoder, reporter and picture, and the specification in `docs/wire.md`.
+//! The serial protocol: frames, decoder, reporter and replica, and the specification in `docs/wire.md`.
 
 mod commands;
 mod console;

@@ -3,8 +3,8 @@
 use super::{frame, vertex};
 use toposlam::wire::{Capacities, Encoder, Hello, Message, QueueFull, Reporter, ResetCause};
 use toposlam::{
-    ConfigError, FaultCounters, FaultKind, Filter, FilterCapacities, Fingerprint, Map, Observation, Update, VertexId,
-    WeightFactors, WorstNgram,
+    ConfigError, FaultCounters, FaultKind, Filter, FilterCapacities, Fingerprint, Map, Observation, RobustFactors,
+    Update, VertexId, WeightFactors, WorstNgram,
 };
 
 pub(crate) const TICKS_PER_HELLO: u16 = 20;
@@ -241,7 +241,7 @@ impl<const V: usize> Robot<V> {
             vertex: self.filter.location,
             is_new: false,
             consistency_mm: 40,
-            factors: WeightFactors { ln_label_q16: -1, ln_consistency_q16: -2, ln_size_q16: -3 },
+            factors: WeightFactors::Robust(RobustFactors { ln_labels_q16: -1, ln_moves_q16: -2, ln_size_q16: -3 }),
             lead_q16: 4,
             distinct: 5,
         }

@@ -3,9 +3,9 @@
 use toposlam::Fingerprint;
 use toposlam::ring::Echo;
 use toposlam::wire::{
-    Belief, CHUNK_BYTES, Capacities, Chunk, Command, Drive, Echoes, Evidence, Health, Hello, Info, Journey,
-    JourneyState, List, Location, Message, Outcome, PlaceProbability, Refusal, Renamed, Reply, Request, ResetCause,
-    Row, Setting, Version, Worst,
+    Belief, CHUNK_BYTES, Capacities, Chunk, Command, Echoes, Evidence, Factors, GoalState, GoalStatus, Health, Hello,
+    Info, List, Location, Message, Outcome, Refusal, Remapped, Reply, Request, ResetCause, Row, Setting, Velocity,
+    Version, VertexProbability, Worst,
 };
 
 /// A plausible message of every kind, in the order of their numbers; a reply of every kind.
@@ -28,30 +28,23 @@ pub(crate) fn typical() -> Vec<Message> {
         Message::Vertex { vertex: 3, radius_mm: 1172, visits: 12 },
         Message::Edge { a: 3, b: 7, present: true },
         Message::Location(Location { place_index: 42, vertex: 3 }),
-        Message::Evidence(Evidence {
-            place_index: 42,
-            consistency_mm: 84,
-            ln_label_q16: -13_107,
-            ln_consistency_q16: -42_000,
-            ln_size_q16: -829_000,
-            lead_q16: 30_500,
-            distinct_hypotheses: 6,
-        }),
+        evidence(Factors::Robust { ln_labels_q16: -13_107, ln_moves_q16: -42_000, ln_size_q16: -829_000 }),
+        evidence(Factors::Paper { ln_label_q16: -13_107, ln_consistency_q16: -42_000, ln_size_q16: -829_000 }),
         Message::Row(Row { vertex: 3, radius_mm: 1172, visits: 12, neighbours: 0b1010_0010 }),
         Message::Fault { kind: 2, count: 5 },
         Message::Health(Health {
             uptime_ms: 345_000,
             loop_count: 5310,
             stack_high_water_bytes: 3000,
-            worst_update_us: 9_800,
+            worst_turn_us: 9_800,
         }),
         Message::Ring { frame_index: 5310, echoes: Echoes::new(&ring) },
         Message::Belief(Belief {
             place_index: 42,
             map_permille: 815,
-            places: List::new([(3, 962), (5, 31)].map(|(vertex, permille)| PlaceProbability { vertex, permille })),
+            vertices: List::new([(3, 962), (5, 31)].map(|(vertex, permille)| VertexProbability { vertex, permille })),
         }),
-        Message::Renamed(Renamed { place_index: 42, names: List::new([0, 1, 255, 2, 3, 1]) }),
+        Message::Remapped(Remapped { place_index: 42, vertices: List::new([0, 1, 255, 2, 3, 1]) }),
         Message::Worst(Worst {
             place_index: 42,
             distance_mm: 84,
@@ -66,15 +59,25 @@ pub(crate) fn typical() -> Vec<Message> {
             uptime_ms: 345_000,
             paused: false,
             localise_only: true,
-            going_to: Some(3),
+            goal: Some(3),
             stored_bytes: 2048,
             stored_places_ago: 7,
         })),
         reply(Outcome::Snapshot { total: 2048, offset: 64, bytes: Chunk::new(0..8) }),
         reply(Outcome::Refused(Refusal::UnknownVertex)),
-        Message::Drive(Drive { frame_index: 5310, heading_mrad: -250, speed_permille: 700, state: 2 }),
-        Message::Journey(Journey { vertex: 3, state: JourneyState::Underway }),
+        Message::Velocity(Velocity { frame_index: 5310, heading_mrad: -250, speed_permille: 700, state: 2 }),
+        Message::GoalStatus(GoalStatus { vertex: 3, state: GoalState::Active }),
     ]
+}
+
+fn evidence(factors: Factors) -> Message {
+    Message::Evidence(Evidence {
+        place_index: 42,
+        consistency_mm: 84,
+        factors,
+        lead_q16: 30_500,
+        distinct_hypotheses: 6,
+    })
 }
 
 fn reply(outcome: Outcome) -> Message {
@@ -166,14 +169,11 @@ pub(crate) fn largest() -> Vec<Message> {
         Message::Vertex { vertex: BYTE, radius_mm: SHORT, visits: WORD },
         Message::Edge { a: BYTE, b: BYTE, present: true },
         Message::Location(Location { place_index: WORD, vertex: BYTE }),
-        Message::Evidence(Evidence {
-            place_index: WORD,
-            consistency_mm: SHORT,
+        largest_evidence(Factors::Robust { ln_labels_q16: i32::MIN, ln_moves_q16: i32::MIN, ln_size_q16: i32::MIN }),
+        largest_evidence(Factors::Paper {
             ln_label_q16: i32::MIN,
             ln_consistency_q16: i32::MIN,
             ln_size_q16: i32::MIN,
-            lead_q16: i32::MAX,
-            distinct_hypotheses: SHORT,
         }),
         Message::Row(Row { vertex: BYTE, radius_mm: SHORT, visits: WORD, neighbours: !0 }),
         Message::Fault { kind: BYTE, count: WORD },
@@ -181,15 +181,15 @@ pub(crate) fn largest() -> Vec<Message> {
             uptime_ms: WORD,
             loop_count: WORD,
             stack_high_water_bytes: WORD,
-            worst_update_us: WORD,
+            worst_turn_us: WORD,
         }),
         Message::Ring { frame_index: WORD, echoes: Echoes::new(&[Echo::Range { range_mm: SHORT }; Echoes::MAX]) },
         Message::Belief(Belief {
             place_index: WORD,
             map_permille: SHORT,
-            places: List::new([PlaceProbability { vertex: BYTE, permille: SHORT }; 8]),
+            vertices: List::new([VertexProbability { vertex: BYTE, permille: SHORT }; 8]),
         }),
-        Message::Renamed(Renamed { place_index: WORD, names: List::new([BYTE; 64]) }),
+        Message::Remapped(Remapped { place_index: WORD, vertices: List::new([BYTE; 64]) }),
         Message::Worst(Worst {
             place_index: WORD,
             distance_mm: SHORT,
@@ -204,15 +204,30 @@ pub(crate) fn largest() -> Vec<Message> {
             uptime_ms: WORD,
             paused: true,
             localise_only: true,
-            going_to: Some(BYTE),
+            goal: Some(BYTE),
             stored_bytes: SHORT,
             stored_places_ago: WORD,
         })),
         largest_reply(Outcome::Snapshot { total: SHORT, offset: SHORT, bytes: Chunk::new([BYTE; CHUNK_BYTES]) }),
         largest_reply(Outcome::Refused(Refusal::Busy)),
-        Message::Drive(Drive { frame_index: WORD, heading_mrad: i16::MIN, speed_permille: i16::MIN, state: BYTE }),
-        Message::Journey(Journey { vertex: BYTE, state: JourneyState::Replaced }),
+        Message::Velocity(Velocity {
+            frame_index: WORD,
+            heading_mrad: i16::MIN,
+            speed_permille: i16::MIN,
+            state: BYTE,
+        }),
+        Message::GoalStatus(GoalStatus { vertex: BYTE, state: GoalState::Replaced }),
     ]
+}
+
+fn largest_evidence(factors: Factors) -> Message {
+    Message::Evidence(Evidence {
+        place_index: u32::MAX,
+        consistency_mm: u16::MAX,
+        factors,
+        lead_q16: i32::MAX,
+        distinct_hypotheses: u16::MAX,
+    })
 }
 
 fn largest_reply(outcome: Outcome) -> Message {
@@ -226,15 +241,14 @@ pub(crate) fn extremes() -> Vec<Message> {
         Message::Evidence(Evidence {
             place_index,
             consistency_mm: 0,
-            ln_label_q16: logarithm,
-            ln_consistency_q16: logarithm,
-            ln_size_q16: logarithm,
+            factors: Factors::Robust { ln_labels_q16: logarithm, ln_moves_q16: logarithm, ln_size_q16: logarithm },
             lead_q16: logarithm,
             distinct_hypotheses: 0,
         })
     };
-    let drive =
-        |state, value| Message::Drive(Drive { frame_index: 0x80, heading_mrad: value, speed_permille: value, state });
+    let drive = |state, value| {
+        Message::Velocity(Velocity { frame_index: 0x80, heading_mrad: value, speed_permille: value, state })
+    };
     let info = Info {
         version: Version { major: 0, minor: 0, patch: 0 },
         boot: 0,
@@ -242,7 +256,7 @@ pub(crate) fn extremes() -> Vec<Message> {
         uptime_ms: 0,
         paused: false,
         localise_only: false,
-        going_to: None,
+        goal: None,
         stored_bytes: 0,
         stored_places_ago: 0,
     };
@@ -259,7 +273,7 @@ pub(crate) fn extremes() -> Vec<Message> {
         Message::Health(Default::default()),
         Message::Ring { frame_index: 0, echoes: Echoes::EMPTY },
         Message::Ring { frame_index: 0, echoes: Echoes::new(&ring) },
-        Message::Renamed(Renamed { place_index: 0, names: List::new([]) }),
+        Message::Remapped(Remapped { place_index: 0, vertices: List::new([]) }),
         Message::Worst(Worst { place_index: 0, distance_mm: 0, newest_age: 0, vertices: List::new([]) }),
         reply(Outcome::Info(info)),
         reply(Outcome::Snapshot { total: 0, offset: 0, bytes: Chunk::new([]) }),
@@ -270,7 +284,7 @@ pub(crate) fn extremes() -> Vec<Message> {
     ];
     extremes.extend(ResetCause::ALL.iter().map(|&reset_cause| Message::Hello(Hello { reset_cause, ..hello })));
     extremes.extend(Refusal::ALL.iter().map(|&refusal| reply(Outcome::Refused(refusal))));
-    extremes.extend(JourneyState::ALL.iter().map(|&state| Message::Journey(Journey { vertex: 0, state })));
+    extremes.extend(GoalState::ALL.iter().map(|&state| Message::GoalStatus(GoalStatus { vertex: 0, state })));
     extremes
 }
 

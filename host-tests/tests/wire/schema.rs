@@ -28,8 +28,23 @@ fn the_pinned_schema_hash_is_that_of_the_types() {
 #[test]
 fn the_samples_hold_every_message_in_the_order_of_its_number() {
     let expected = [
-        "Hello", "Place", "Map", "Vertex", "Edge", "Location", "Evidence", "Row", "Fault", "Health", "Ring", "Belief",
-        "Renamed", "Worst", "Reply", "Drive", "Journey",
+        "Hello",
+        "Place",
+        "Map",
+        "Vertex",
+        "Edge",
+        "Location",
+        "Evidence",
+        "Row",
+        "Fault",
+        "Health",
+        "Ring",
+        "Belief",
+        "Remapped",
+        "Worst",
+        "Reply",
+        "Velocity",
+        "GoalStatus",
     ];
     let mut described: Vec<_> = typical().iter().map(describe).collect();
     described.dedup_by_key(|line| line.split(' ').next().map(str::to_owned));

@@ -6,7 +6,7 @@ use super::samples::{largest, largest_requests, requests, typical};
 use super::{frame, hear, schema};
 use toposlam::FaultKind;
 use toposlam::wire::{
-    CHUNK_BYTES, Decoder, Encoder, FRAME_VERSION, JourneyState, MAX_FRAME_BYTES, PROTOCOL_VERSION, Payload, Progress,
+    CHUNK_BYTES, Decoder, Encoder, FRAME_VERSION, GoalState, MAX_FRAME_BYTES, PROTOCOL_VERSION, Payload, Progress,
     Refusal, Request, ResetCause, SCHEMA_HASH,
 };
 
@@ -113,7 +113,7 @@ fn the_specification_lists_every_kind_that_is_one_byte_with_its_number() {
     }
     listed(FaultKind::ALL.iter().map(|&kind| (kind as u8, kind)));
     listed(ResetCause::ALL.iter().map(|&kind| (kind.into(), kind)));
-    listed(JourneyState::ALL.iter().map(|&kind| (kind.into(), kind)));
+    listed(GoalState::ALL.iter().map(|&kind| (kind.into(), kind)));
     // Each refusal has a line of its own.
     for &refusal in Refusal::ALL {
         assert!(SPECIFICATION.contains(&format!("| {} | {refusal:?} |", u8::from(refusal))), "{refusal:?}");
@@ -126,7 +126,7 @@ fn a_kind_that_is_not_known_is_read_as_the_first() {
         let known = |kind: u8| if kind == 0 { 0 } else { number };
         assert_eq!(u8::from(ResetCause::from(number)), known(ResetCause::from(number).into()));
         assert_eq!(u8::from(Refusal::from(number)), known(Refusal::from(number).into()));
-        assert_eq!(u8::from(JourneyState::from(number)), known(JourneyState::from(number).into()));
+        assert_eq!(u8::from(GoalState::from(number)), known(GoalState::from(number).into()));
     }
     assert_eq!(ResetCause::from(u8::MAX), ResetCause::Unknown);
 }

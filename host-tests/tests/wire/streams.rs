@@ -4,8 +4,8 @@ use super::damage::with_crc;
 use super::samples::{extremes, largest, requests, typical};
 use super::{frame, hear};
 use toposlam::wire::{
-    Belief, Encoder, Hello, Journey, JourneyState, List, Location, Message, PlaceProbability, Renamed, ResetCause,
-    Worst, crc32,
+    Belief, Encoder, FRAME_VERSION, GoalState, GoalStatus, Hello, List, Location, Message, Remapped, ResetCause,
+    VertexProbability, Worst, crc32,
 };
 
 /// Frames lost, repeated and overtaken.
@@ -46,15 +46,15 @@ pub(crate) fn every_damage() -> Vec<u8> {
         &[0],
         &[0xFF; 120],
         &[0],
-        &with_crc(&[2, 3, 0, 4, 1, 2, 1]),
+        &with_crc(&[FRAME_VERSION + 1, 3, 0, 4, 1, 2, 1]),
         &request,
         // After a gap a message that is not known here is not taken for received, in order it is.
-        &with_crc(&[1, 9, 0, 0x7F]),
+        &with_crc(&[FRAME_VERSION, 9, 0, 0x7F]),
         &edge(4, 5),
-        &with_crc(&[1, 5, 0, 4, 1, 2, 1, 9]),
-        &with_crc(&[1, 6, 0, 4, 1, 2]),
-        &with_crc(&[1, 7, 0, 4, 1, 2, 2]),
-        &with_crc(&[1]),
+        &with_crc(&[FRAME_VERSION, 5, 0, 4, 1, 2, 1, 9]),
+        &with_crc(&[FRAME_VERSION, 6, 0, 4, 1, 2]),
+        &with_crc(&[FRAME_VERSION, 7, 0, 4, 1, 2, 2]),
+        &with_crc(&[FRAME_VERSION]),
         &edge(8, 6),
         &edge(8, 7),
         &edge(9, 63),
@@ -72,7 +72,7 @@ pub(crate) fn wrapping() -> Vec<u8> {
 /// Each list with one element more than it can have, and a number of elements beyond all bounds.
 pub(crate) fn long_lists() -> Vec<u8> {
     let list = |head: &[u8], count: u8, element: &[u8]| {
-        let body = [&[1, 0, 0], head, &[count], &element.repeat(count.into())].concat();
+        let body = [&[FRAME_VERSION, 0, 0], head, &[count], &element.repeat(count.into())].concat();
         with_crc(&body)
     };
     [
@@ -81,13 +81,13 @@ pub(crate) fn long_lists() -> Vec<u8> {
         list(&[12, 0], 65, &[1]),
         list(&[13, 0, 0, 0], 8, &[1]),
         list(&[14, 0, 2, 0, 0], 65, &[1]),
-        with_crc(&[1, 0, 0, 12, 0, 0xFF, 0xFF, 0xFF, 0xFF, 0xFF, 0xFF, 0xFF, 0xFF, 0xFF, 1]),
-        with_crc(&[1, 0, 0, 12, 0, 0xFF, 0xFF, 0xFF, 0xFF, 0xFF, 0xFF, 0xFF, 0xFF, 0xFF, 3]),
+        with_crc(&[FRAME_VERSION, 0, 0, 12, 0, 0xFF, 0xFF, 0xFF, 0xFF, 0xFF, 0xFF, 0xFF, 0xFF, 0xFF, 1]),
+        with_crc(&[FRAME_VERSION, 0, 0, 12, 0, 0xFF, 0xFF, 0xFF, 0xFF, 0xFF, 0xFF, 0xFF, 0xFF, 0xFF, 3]),
         // A varint may be longer than it has to be, and names no value beyond its type.
-        with_crc(&[1, 0, 0, 12, 0x80, 0x80, 0, 0x81, 0, 7]),
-        with_crc(&[1, 1, 0, 12, 0xFF, 0xFF, 0xFF, 0xFF, 0x0F, 0]),
-        with_crc(&[1, 2, 0, 12, 0xFF, 0xFF, 0xFF, 0xFF, 0x1F, 0]),
-        with_crc(&[1, 2, 0, 12, 0x80, 0x80, 0x80, 0x80, 0x80, 0, 0]),
+        with_crc(&[FRAME_VERSION, 0, 0, 12, 0x80, 0x80, 0, 0x81, 0, 7]),
+        with_crc(&[FRAME_VERSION, 1, 0, 12, 0xFF, 0xFF, 0xFF, 0xFF, 0x0F, 0]),
+        with_crc(&[FRAME_VERSION, 2, 0, 12, 0xFF, 0xFF, 0xFF, 0xFF, 0x1F, 0]),
+        with_crc(&[FRAME_VERSION, 2, 0, 12, 0x80, 0x80, 0x80, 0x80, 0x80, 0, 0]),
     ]
     .concat()
 }
@@ -98,8 +98,9 @@ pub(crate) fn renamed() -> Vec<Vec<u8>> {
         [&[2], &[232, 3, 1, 0, 0, 0, 2, 0, 0, 0, 0, 0, 0, 0], &[232, 3, 1, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0]];
     let map = Message::Map { vertices: 2, edges: 1, digest: crc32(&canonical.concat()) };
     let vertex = |vertex| Message::Vertex { vertex, radius_mm: 1000, visits: 1 };
-    let names = |names: &[u8]| Message::Renamed(Renamed { place_index: 2, names: List::new(names.iter().copied()) });
-    let place = |(vertex, permille)| PlaceProbability { vertex, permille };
+    let names =
+        |names: &[u8]| Message::Remapped(Remapped { place_index: 2, vertices: List::new(names.iter().copied()) });
+    let place = |(vertex, permille)| VertexProbability { vertex, permille };
     let messages = [
         vertex(0),
         vertex(1),
@@ -115,10 +116,10 @@ pub(crate) fn renamed() -> Vec<Vec<u8>> {
         Message::Belief(Belief {
             place_index: 2,
             map_permille: 500,
-            places: List::new([(1, 600), (0, 300), (2, 70)].map(place)),
+            vertices: List::new([(1, 600), (0, 300), (2, 70)].map(place)),
         }),
         Message::Location(Location { place_index: 2, vertex: 1 }),
-        Message::Journey(Journey { vertex: 0, state: JourneyState::Underway }),
+        Message::GoalStatus(GoalStatus { vertex: 0, state: GoalState::Active }),
         Message::Worst(Worst { place_index: 2, distance_mm: 9, newest_age: 1, vertices: List::new([0, 1, 0]) }),
         names(&[2, 2, 0]),
         names(&[0, 1, 255, 4]),

@@ -47,7 +47,7 @@ fn latency(places: usize, speed: f64) -> anyhow::Result<()> {
     thread::spawn(move || be_a_robot(broadcast, speed, &robots));
     let mut times_ms = Vec::new();
     screen::run(&line, 0, Options::default(), |model| {
-        if let (Some(location), Ok(mut written)) = (model.watch().listener().picture().location(), written.lock()) {
+        if let (Some(location), Ok(mut written)) = (model.watch().listener().replica().location(), written.lock()) {
             let later = written.split_off(&location.place_index.saturating_add(1));
             let drawn = std::mem::replace(&mut *written, later);
             times_ms.extend(drawn.into_values().map(|written_at| written_at.elapsed().as_secs_f64() * 1000.0));

@@ -131,7 +131,7 @@ fn command_tells_a_robot_over_its_line_what_to_do_and_prints_what_it_says() {
         uptime_ms: 61_500,
         paused: false,
         localise_only: true,
-        going_to: Some(3),
+        goal: Some(3),
         stored_bytes: 2048,
         stored_places_ago: 7,
     };

@@ -146,7 +146,7 @@ fn explored(buffer: &mut [u8], mut say: impl FnMut(&[u8])) -> Exploration<'_> {
     let plan = Plan::built_in("flat").unwrap();
     let mut exploration = Exploration::start(&plan, RobotModel::default(), 1, buffer).unwrap();
     let mut listener = Listener::new();
-    while exploration.places() < PLACES || !listener.picture().is_converged() || listener.map() != map(&exploration) {
+    while exploration.places() < PLACES || !listener.replica().is_converged() || listener.map() != map(&exploration) {
         exploration.advance();
         let said = &exploration.board().sent;
         listener.feed(said, |_, _| ());
@@ -186,7 +186,7 @@ fn whoever_subscribes_late_gets_the_robots_map_and_learns_when_the_publisher_is_
             _ => {}
         }
         has_map |= message.topic == "toposlam/kitchen/map" && is_map(message, &map);
-        has_map && places > 0 && listener.picture().is_converged() && listener.map() == map
+        has_map && places > 0 && listener.replica().is_converged() && listener.map() == map
     });
     assert!(map.vertices.len() > 2 && !map.edges.is_empty());
     assert_eq!((listener.counters().corrupt, listener.counters().unknown_message), (0, 0));

@@ -35,7 +35,7 @@ fn main() -> anyhow::Result<()> {
     seconds.sort_by(f64::total_cmp);
     let median = seconds[RUNS / 2];
     let (bytes, frames) = (stream.len(), listener.counters().messages);
-    let vertices = listener.picture().vertices();
+    let vertices = listener.replica().vertices();
     println!("{bytes} bytes, {frames} frames, {vertices} vertices, median of {RUNS} runs on one core");
     println!("{:.1} MB/s, {:.0} frames/s", bytes as f64 / median / 1e6, f64::from(frames) / median);
     Ok(())

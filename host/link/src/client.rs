@@ -7,7 +7,7 @@ use std::{
 };
 
 use toposlam::wire::{
-    CHUNK_BYTES, Chunk, Command, Encoder, Info, MAX_FRAME_BYTES, Message, Outcome, Picture, Refusal, Request, crc32,
+    CHUNK_BYTES, Chunk, Command, Encoder, Info, MAX_FRAME_BYTES, MapReplica, Message, Outcome, Refusal, Request, crc32,
 };
 
 use crate::listener::{Event, Listener};
@@ -121,15 +121,15 @@ impl<LINE: Read + Write, HEARD: FnMut(&Listener, Event<'_>)> Client<LINE, HEARD>
     ///
     /// # Errors
     /// As [`Client::order`], and [`ClientError::NoMap`] when something of it was lost on the line each time.
-    pub fn map(&mut self) -> Result<&Picture<64>, ClientError> {
+    pub fn map(&mut self) -> Result<&MapReplica<64>, ClientError> {
         for _ in 0..self.attempts {
             self.order(Command::GetMap)?;
             let deadline = Instant::now() + self.timeout;
             while Instant::now() < deadline {
                 self.listen()?;
-                let picture = self.listener.picture();
-                if picture.is_converged() && picture.is_complete() {
-                    return Ok(self.listener.picture());
+                let replica = self.listener.replica();
+                if replica.is_converged() && replica.is_complete() {
+                    return Ok(self.listener.replica());
                 }
             }
         }

@@ -62,7 +62,7 @@ fn object(name: &str, fields: Value) -> Map<String, Value> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use toposlam::wire::{Belief, DecodeError, Header, List, PlaceProbability};
+    use toposlam::wire::{Belief, DecodeError, Header, List, VertexProbability};
 
     #[test]
     fn an_event_tells_what_was_lost_or_damaged() {
@@ -79,10 +79,10 @@ mod tests {
     #[test]
     fn lists_and_options_are_plain_json() {
         let header = Header { sequence: 0, arrival: Arrival::InOrder };
-        let places = List::new([PlaceProbability { vertex: 2, permille: 900 }]);
+        let vertices = List::new([VertexProbability { vertex: 2, permille: 900 }]);
         let belief =
-            event(Event::Message(header, &Message::Belief(Belief { place_index: 4, map_permille: 1000, places })));
-        assert_eq!(belief["places"], json!([{"vertex": 2, "permille": 900}]));
+            event(Event::Message(header, &Message::Belief(Belief { place_index: 4, map_permille: 1000, vertices })));
+        assert_eq!(belief["vertices"], json!([{"vertex": 2, "permille": 900}]));
         let place = Message::Place { place_index: 1, frame_index: 2, radius_mm: 3, degree: None };
         assert_eq!(event(Event::Message(header, &place))["degree"], Value::Null);
     }

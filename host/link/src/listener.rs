@@ -16,8 +16,8 @@
 use std::fmt;
 
 use toposlam::wire::{
-    Arrival, DecodeError, Decoder, DecoderCounters, Drive, Echoes, Header, Hello, HelloError, Message,
-    PROTOCOL_VERSION, Picture, Progress,
+    Arrival, DecodeError, Decoder, DecoderCounters, Echoes, Header, Hello, HelloError, MapReplica, Message,
+    PROTOCOL_VERSION, Progress, Velocity,
 };
 
 use crate::topology::TopologicalMap;
@@ -44,15 +44,15 @@ impl<'a> From<&'a Result<(Header, Message), DecodeError>> for Event<'a> {
 #[derive(Clone, Debug)]
 pub struct Listener {
     decoder: Decoder,
-    picture: Picture<64>,
+    replica: MapReplica<64>,
     latest: Latest,
 }
 
-/// The newest of what [`Picture`] does not keep.
+/// The newest of what [`MapReplica`] does not keep.
 #[derive(Clone, Copy, Debug, Default)]
 struct Latest {
     ring: Option<(u32, Echoes)>,
-    drive: Option<Drive>,
+    velocity: Option<Velocity>,
     sighting: Option<Sighting>,
 }
 
@@ -121,7 +121,7 @@ impl Default for Listener {
 impl Listener {
     /// A listener who has heard nothing.
     pub fn new() -> Self {
-        Self { decoder: Decoder::new(), picture: Picture::new(), latest: Latest::default() }
+        Self { decoder: Decoder::new(), replica: MapReplica::new(), latest: Latest::default() }
     }
 
     /// Takes bytes as the line delivers them, in pieces of any length, and tells what they were, with itself as it is then.
@@ -144,7 +144,7 @@ impl Listener {
     }
 
     fn take_in(&mut self, header: Header, message: &Message) {
-        self.picture.apply(header, message);
+        self.replica.apply(header, message);
         match header.arrival {
             Arrival::Late => return,
             Arrival::Restart => self.latest = Latest::default(),
@@ -152,7 +152,7 @@ impl Listener {
         }
         match *message {
             Message::Ring { frame_index, echoes } => self.latest.ring = Some((frame_index, echoes)),
-            Message::Drive(drive) => self.latest.drive = Some(drive),
+            Message::Velocity(velocity) => self.latest.velocity = Some(velocity),
             Message::Place { place_index, frame_index, radius_mm, degree } => {
                 self.latest.sighting = Some(Sighting { place_index, frame_index, radius_mm, degree });
             }
@@ -166,13 +166,13 @@ impl Listener {
     }
 
     /// The map and the rest of what was heard.
-    pub const fn picture(&self) -> &Picture<64> {
-        &self.picture
+    pub const fn replica(&self) -> &MapReplica<64> {
+        &self.replica
     }
 
     /// The map alone.
     pub fn map(&self) -> TopologicalMap {
-        TopologicalMap::from(&self.picture)
+        TopologicalMap::from(&self.replica)
     }
 
     /// How many messages came, and what was lost or damaged on the line.
@@ -182,7 +182,7 @@ impl Listener {
 
     /// How well the robot is understood.
     pub fn understanding(&self) -> Understanding {
-        Understanding::of(self.picture.hello())
+        Understanding::of(self.replica.hello())
     }
 
     /// The newest ring frame: its number and what each sonar said.
@@ -190,9 +190,9 @@ impl Listener {
         self.latest.ring
     }
 
-    /// Where the drive steered last.
-    pub const fn drive(&self) -> Option<Drive> {
-        self.latest.drive
+    /// The last velocity command.
+    pub const fn velocity(&self) -> Option<Velocity> {
+        self.latest.velocity
     }
 
     /// The newest place, as its detector saw it.

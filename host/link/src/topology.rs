@@ -18,7 +18,7 @@
 //! ```
 
 use petgraph::graph::UnGraph;
-use toposlam::wire::{Picture, crc32};
+use toposlam::wire::{MapReplica, crc32};
 use toposlam::{Map, VertexId};
 
 /// The vertices of a map and the edges between them.
@@ -80,12 +80,12 @@ impl TopologicalMap {
 }
 
 /// The map as heard so far.
-impl<const V: usize> From<&Picture<V>> for TopologicalMap {
-    fn from(picture: &Picture<V>) -> Self {
+impl<const V: usize> From<&MapReplica<V>> for TopologicalMap {
+    fn from(replica: &MapReplica<V>) -> Self {
         let label = |vertex| {
-            picture.row(vertex).map_or(Vertex::default(), |row| Vertex { radius_mm: row.radius_mm, visits: row.visits })
+            replica.row(vertex).map_or(Vertex::default(), |row| Vertex { radius_mm: row.radius_mm, visits: row.visits })
         };
-        Self { vertices: (0..picture.vertices()).map(label).collect(), edges: picture.edges().collect() }
+        Self { vertices: (0..replica.vertices()).map(label).collect(), edges: replica.edges().collect() }
     }
 }
 
@@ -118,9 +118,9 @@ mod tests {
     #[test]
     fn a_map_of_which_little_was_heard_has_the_vertices_of_its_edges() {
         use toposlam::wire::{Arrival, Header, Message};
-        let mut picture = Picture::<64>::new();
-        picture.apply(Header { sequence: 0, arrival: Arrival::First }, &Message::Edge { a: 1, b: 3, present: true });
-        let topology = TopologicalMap::from(&picture);
+        let mut replica = MapReplica::<64>::new();
+        replica.apply(Header { sequence: 0, arrival: Arrival::First }, &Message::Edge { a: 1, b: 3, present: true });
+        let topology = TopologicalMap::from(&replica);
         assert_eq!((topology.vertices.len(), &topology.edges[..]), (4, &[(1, 3)][..]));
         assert_eq!(topology.neighbours(), [vec![], vec![3], vec![], vec![1]]);
         assert_eq!(topology.to_petgraph().edge_count(), 1);

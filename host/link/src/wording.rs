@@ -12,7 +12,8 @@ use toposlam::FaultKind;
 use toposlam::drive::DriveState;
 use toposlam::ring::Echo;
 use toposlam::wire::{
-    Arrival, Belief, Drive, Evidence, Health, Hello, Info, Journey, Message, Outcome, Renamed, Row, Worst,
+    Arrival, Belief, Evidence, Factors, GoalStatus, Health, Hello, Info, Message, Outcome, Remapped, Row, Velocity,
+    Worst,
 };
 
 use crate::listener::Event;
@@ -59,11 +60,11 @@ pub fn message(message: &Message) -> String {
             format!("ring frame {frame_index}: {} mm", ranges.join(" "))
         }
         Message::Belief(belief) => probabilities(belief),
-        Message::Renamed(renamed) => new_numbers(renamed),
+        Message::Remapped(remapped) => new_ids(remapped),
         Message::Worst(worst) => worst_explained(worst),
         Message::Reply(reply) => format!("reply to request {}: {}", reply.request, outcome(&reply.outcome)),
-        Message::Drive(drive) => steering(drive),
-        Message::Journey(Journey { vertex, state }) => format!("way to vertex {vertex}: {state}"),
+        Message::Velocity(velocity) => steering(velocity),
+        Message::GoalStatus(GoalStatus { vertex, state }) => format!("goal vertex {vertex}: {state}"),
         other => format!("{other:?}"),
     }
 }
@@ -91,7 +92,7 @@ pub fn info(info: &Info) -> Vec<String> {
         format!("up for {:.1} s", seconds(info.uptime_ms)),
         format!("{}{mapping}", if info.paused { "paused; otherwise it " } else { "" }),
     ];
-    lines.extend(info.going_to.map(|vertex| format!("on the way to vertex {vertex}")));
+    lines.extend(info.goal.map(|vertex| format!("on the way to vertex {vertex}")));
     lines.push(match info.stored_bytes {
         0 => "no snapshot stored".to_owned(),
         bytes => format!("snapshot of {bytes} bytes stored {} places ago", info.stored_places_ago),
@@ -150,14 +151,28 @@ fn introduction(hello: &Hello) -> String {
     )
 }
 
+/// The factors of a weight by name, as logarithms in nats.
+pub fn factors(factors: &Factors) -> String {
+    match *factors {
+        Factors::Robust { ln_labels_q16, ln_moves_q16, ln_size_q16 } => {
+            format!("labels {:.2}, moves {:.2}, size {:.2}", nats(ln_labels_q16), nats(ln_moves_q16), nats(ln_size_q16))
+        }
+        Factors::Paper { ln_label_q16, ln_consistency_q16, ln_size_q16 } => format!(
+            "Eq. 7 {:.2}, Eq. 8 {:.2}, Eq. 9 {:.2}",
+            nats(ln_label_q16),
+            nats(ln_consistency_q16),
+            nats(ln_size_q16)
+        ),
+        other => format!("{other:?}"),
+    }
+}
+
 fn reasons(evidence: &Evidence) -> String {
     format!(
-        "evidence of place {}: consistency {}, label {:.2}, consistency {:.2}, size {:.2}, lead {:.2} nats, {} hypotheses",
+        "evidence of place {}: consistency {}, {}, lead {:.2} nats, {} hypotheses",
         evidence.place_index,
         distance(evidence.consistency_mm),
-        nats(evidence.ln_label_q16),
-        nats(evidence.ln_consistency_q16),
-        nats(evidence.ln_size_q16),
+        factors(&evidence.factors),
         nats(evidence.lead_q16),
         evidence.distinct_hypotheses
     )
@@ -181,7 +196,7 @@ fn condition(health: &Health) -> String {
         seconds(health.uptime_ms),
         health.loop_count,
         health.stack_high_water_bytes,
-        health.worst_update_us
+        health.worst_turn_us
     )
 }
 
@@ -194,26 +209,26 @@ fn range(echo: Echo) -> String {
 }
 
 fn probabilities(belief: &Belief) -> String {
-    let places: Vec<String> =
-        belief.places.as_slice().iter().map(|place| format!("{} {}‰", place.vertex, place.permille)).collect();
+    let vertices = belief.vertices.as_slice().iter();
+    let vertices: Vec<String> = vertices.map(|at| format!("{} {}‰", at.vertex, at.permille)).collect();
     format!(
         "belief after place {}: this map {}‰, at vertex {}",
         belief.place_index,
         belief.map_permille,
-        places.join(", ")
+        vertices.join(", ")
     )
 }
 
-fn new_numbers(renamed: &Renamed) -> String {
+fn new_ids(remapped: &Remapped) -> String {
     let changes: Vec<String> = (0..)
-        .zip(renamed.names.as_slice())
-        .filter_map(|(before, _)| match renamed.now(before) {
+        .zip(remapped.vertices.as_slice())
+        .filter_map(|(before, _)| match remapped.now(before) {
             Some(now) if now == before => None,
             Some(now) => Some(format!("{before} is {now}")),
-            None => Some(format!("{before} is gone")),
+            None => Some(format!("{before} is removed")),
         })
         .collect();
-    format!("vertices renamed with place {}: {}", renamed.place_index, changes.join(", "))
+    format!("vertices remapped with place {}: {}", remapped.place_index, changes.join(", "))
 }
 
 fn worst_explained(worst: &Worst) -> String {
@@ -226,7 +241,7 @@ fn worst_explained(worst: &Worst) -> String {
     )
 }
 
-fn steering(drive: &Drive) -> String {
+fn steering(drive: &Velocity) -> String {
     format!(
         "drive in frame {}: heading {} mrad, speed {}‰, {}",
         drive.frame_index,
@@ -250,9 +265,9 @@ mod tests {
     }
 
     #[test]
-    fn renamed_vertices_are_told_by_their_numbers_before_and_now() {
-        let renamed = Renamed { place_index: 2, names: List::new([0, 2, 255]) };
-        assert_eq!(message(&Message::Renamed(renamed)), "vertices renamed with place 2: 1 is 2, 2 is gone");
+    fn remapped_vertices_are_shown_with_their_ids_before_and_after() {
+        let remapped = Remapped { place_index: 2, vertices: List::new([0, 2, 255]) };
+        assert_eq!(message(&Message::Remapped(remapped)), "vertices remapped with place 2: 1 is 2, 2 is removed");
     }
 
     #[test]

@@ -21,7 +21,7 @@ use toposlam::drive::{Goal, VelocityCommand};
 use toposlam::place::Place;
 use toposlam::reference::{ROBOT, ReferenceRobot, SONARS};
 use toposlam::ring::RingFrame;
-use toposlam::robot::{Board, KeepError, Seen};
+use toposlam::robot::{Board, SaveError, Seen};
 use toposlam::wire::{Encoder, MAX_FRAME_BYTES, QueueFull, Request};
 use toposlam::{FaultCounters, FaultKind};
 
@@ -75,7 +75,7 @@ impl Board for MemoryBoard {
         0
     }
 
-    fn keep(&mut self, snapshot: &[u8]) -> Result<(), KeepError> {
+    fn save(&mut self, snapshot: &[u8]) -> Result<(), SaveError> {
         self.kept = snapshot.to_vec();
         Ok(())
     }

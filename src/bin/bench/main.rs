@@ -27,7 +27,7 @@ use toposlam::{
         self, Detector, Filter, HISTORY, PaperReference, ReferenceRobot, RobotMapper, SNAPSHOT_BYTES, SONARS, VERTICES,
     },
     ring::{Echo, RingFrame},
-    robot::{Board, KeepError},
+    robot::{Board, SaveError},
     wire::{
         Capacities, Chunk, Command, Encoder, Hello, Inbox, MAX_FRAME_BYTES, Outcome, QueueFull, Reporter, Request,
         ResetCause,
@@ -172,8 +172,8 @@ impl Board for NullBoard {
         0
     }
 
-    fn keep(&mut self, _: &[u8]) -> Result<(), KeepError> {
-        Err(KeepError::NoStore)
+    fn save(&mut self, _: &[u8]) -> Result<(), SaveError> {
+        Err(SaveError::NoStore)
     }
 }
 

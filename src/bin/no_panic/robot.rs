@@ -11,7 +11,7 @@ use toposlam::drive::{
 };
 use toposlam::persist::snapshot::{Resume, SnapshotError};
 use toposlam::reference::{self, HISTORY, ReferenceRobot, SNAPSHOT_BYTES, VERTICES};
-use toposlam::robot::{Board, KeepError, RobotError};
+use toposlam::robot::{Board, RobotError, SaveError};
 use toposlam::wire::QueueFull;
 use toposlam::{FaultCounters, VertexId};
 
@@ -46,7 +46,7 @@ impl Board for Any {
         black_box(0)
     }
 
-    fn keep(&mut self, snapshot: &[u8]) -> Result<(), KeepError> {
+    fn save(&mut self, snapshot: &[u8]) -> Result<(), SaveError> {
         black_box(snapshot);
         black_box(Ok(()))
     }
@@ -121,6 +121,6 @@ pub(crate) fn robot() {
     if let Err(error) = robot.restore(black_box(&[1, 2, 3]), resume) {
         show::<SnapshotError>(error);
     }
-    show(KeepError::NoStore.opaque());
+    show(SaveError::NoStore.opaque());
     black_box((robot.mapper(), robot.drive(), robot.faults(&FaultCounters::new())));
 }

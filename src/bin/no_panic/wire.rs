@@ -7,8 +7,8 @@ use toposlam::{
     FaultKind, RobustConfig,
     place::PlaceConfig,
     wire::{
-        Decoder, EncodeError, Encoder, Hello, HelloError, Inbox, JourneyState, MAX_FRAME_BYTES, Message, Outcome,
-        Payload, Picture, Progress, Refusal, Reply, Request, ResetCause, Setting, Settings, Staging, Version, crc32,
+        Decoder, EncodeError, Encoder, GoalState, Hello, HelloError, Inbox, MAX_FRAME_BYTES, MapReplica, Message,
+        Outcome, Payload, Progress, Refusal, Reply, Request, ResetCause, Setting, Settings, Staging, Version, crc32,
     },
 };
 
@@ -17,8 +17,8 @@ use crate::any::{Opaque, any_frame, show};
 pub(crate) fn wire() {
     static BYTES: ConstStaticCell<[u8; MAX_FRAME_BYTES]> = ConstStaticCell::new([0; MAX_FRAME_BYTES]);
     static DECODER: ConstStaticCell<Decoder> = ConstStaticCell::new(Decoder::new());
-    static PICTURE: ConstStaticCell<Picture<64>> = ConstStaticCell::new(Picture::new());
-    let (Some(bytes), Some(decoder), Some(picture)) = (BYTES.try_take(), DECODER.try_take(), PICTURE.try_take()) else {
+    static REPLICA: ConstStaticCell<MapReplica<64>> = ConstStaticCell::new(MapReplica::new());
+    let (Some(bytes), Some(decoder), Some(replica)) = (BYTES.try_take(), DECODER.try_take(), REPLICA.try_take()) else {
         return;
     };
     let mut encoder = Encoder::new(black_box(9));
@@ -35,20 +35,20 @@ pub(crate) fn wire() {
                 rest
             }
             Progress::Message { header, message, rest } => {
-                picture.apply(header, &message);
+                replica.apply(header, &message);
                 rest
             }
         };
     }
     black_box(decoder.counters());
-    black_box((picture.is_converged(), picture.is_complete(), picture.vertices(), picture.row(black_box(1))));
-    for edge in picture.edges() {
+    black_box((replica.is_converged(), replica.is_complete(), replica.vertices(), replica.row(black_box(1))));
+    for edge in replica.edges() {
         black_box(edge);
     }
-    black_box((picture.hello(), picture.location(), picture.evidence(), picture.health()));
-    black_box((picture.belief(), picture.worst(), picture.journey()));
-    black_box((picture.neighbours(black_box(3)), picture.fault(FaultKind::BusError.opaque())));
-    if let Some(Err(error)) = picture.hello().map(|hello: Hello| hello.check()) {
+    black_box((replica.hello(), replica.location(), replica.evidence(), replica.health()));
+    black_box((replica.belief(), replica.worst(), replica.goal_status()));
+    black_box((replica.neighbours(black_box(3)), replica.fault(FaultKind::BusError.opaque())));
+    if let Some(Err(error)) = replica.hello().map(|hello: Hello| hello.check()) {
         show::<HelloError>(error);
     }
     let echoes = toposlam::wire::Echoes::new(&any_frame().echoes);
@@ -106,5 +106,5 @@ pub(crate) fn commands() {
     };
     black_box(settings.with(Setting::Hypotheses(7).opaque(), black_box(10), black_box(16)).is_ok());
     show(ResetCause::from(black_box(3)));
-    show(JourneyState::from(black_box(3)));
+    show(GoalState::from(black_box(3)));
 }

@@ -18,7 +18,7 @@ pub use ngram::{Ngram, NgramError, NgramLength, NgramTable, NgramsFull};
 pub use particle::Particle;
 pub use prior::Prior;
 
-use super::{ConfigError, Update, draws};
+use super::{ConfigError, Update, WeightFactors, draws};
 use crate::{FaultCounters, FaultKind, Fingerprint, Map};
 use particles::{Particles, Step};
 use rand_core::Rng;
@@ -165,7 +165,7 @@ impl<const N: usize, const V: usize, const WORDS: usize> PaperFilter<N, V, WORDS
             vertex: best.at,
             is_new: best.map.visits(best.at) == 1,
             consistency_mm: best.consistency_mm,
-            factors: best.factors,
+            factors: WeightFactors::Paper(best.factors),
             lead_q16: step.lead_q16,
             distinct: self.particles.distinct(),
         };

@@ -1,6 +1,6 @@
 //! One particle: a map, the place the robot is at, and the weight (Section III.A).
 
-use crate::filter::WeightFactors;
+use crate::filter::PaperFactors;
 use crate::{Fingerprint, Map, VertexId};
 
 /// One hypothesis: a map and the place the robot is at.
@@ -17,7 +17,7 @@ pub struct Particle<const V: usize> {
     /// The distance of Eq. 2 in millimetres; `u16::MAX` when it is infinite.
     pub consistency_mm: u16,
     /// The factors of its weight.
-    pub factors: WeightFactors,
+    pub factors: PaperFactors,
 }
 
 impl<const V: usize> Particle<V> {
@@ -27,7 +27,7 @@ impl<const V: usize> Particle<V> {
         multiplicity: 0,
         parent: 0,
         consistency_mm: 0,
-        factors: WeightFactors::ONE,
+        factors: PaperFactors::ONE,
     };
 }
 

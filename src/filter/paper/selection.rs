@@ -2,7 +2,7 @@
 
 use super::particle::{Particle, predict};
 use super::resample::{DISTANCE_REACH, PROPOSAL_REACH, PROPOSALS, accepts, draw_weight, target};
-use crate::filter::WeightFactors;
+use crate::filter::PaperFactors;
 use crate::filter::paper::consistency::{Consistency, Direction, Evidence};
 use crate::filter::paper::likelihood::Likelihood;
 use crate::map::PerVertex;
@@ -181,12 +181,12 @@ impl<E: Evidence<WORDS>, const N: usize, const V: usize, const WORDS: usize, con
     }
 
     /// The consistency of a prediction that was chosen, in millimetres, and the factors of its weight.
-    pub(super) fn judge(&mut self, parent: &Particle<V>, choice: Choice) -> (u16, WeightFactors) {
+    pub(super) fn judge(&mut self, parent: &Particle<V>, choice: Choice) -> (u16, PaperFactors) {
         let consistency_mm = match self.distance(choice, DISTANCE_REACH) {
             Distance::Known(distance_mm) => distance_mm,
             Distance::Unknown | Distance::TooLarge => u16::MAX,
         };
-        let factors = WeightFactors {
+        let factors = PaperFactors {
             ln_label_q16: ln_label(self.likelihood, parent, choice.vertex, self.observation),
             ln_consistency_q16: self.likelihood.ln_consistency(consistency_mm),
             ln_size_q16: ln_size(self.likelihood, parent, choice.vertex, self.observation),

@@ -1,7 +1,7 @@
 //! What the filter tells of its best map: graph and numbers, where the robot may be, how far the map is to be trusted.
 
 use super::{RobustFilter, worst};
-use crate::filter::{Update, WeightFactors, WorstNgram};
+use crate::filter::{RobustFactors, Update, WeightFactors, WorstNgram};
 use crate::map::bits;
 use crate::{Fingerprint, Map, VertexId};
 
@@ -63,11 +63,11 @@ impl<const N: usize, const V: usize, const HISTORY: usize> RobustFilter<N, V, HI
             vertex: VertexId::new(self.names.name(best.place)).unwrap_or(VertexId::FIRST),
             is_new: best.tally(best.place).visits == 1,
             consistency_mm: self.worst.distance_mm,
-            factors: WeightFactors {
-                ln_label_q16: q16(factors[0]),
-                ln_consistency_q16: q16(factors[1]),
+            factors: WeightFactors::Robust(RobustFactors {
+                ln_labels_q16: q16(factors[0]),
+                ln_moves_q16: q16(factors[1]),
                 ln_size_q16: q16(factors[2]),
-            },
+            }),
             lead_q16: q16((-rival).clamp(-LEAD_MAX, LEAD_MAX)),
             distinct: self.beam.len() as u8,
         }

@@ -2,7 +2,7 @@
 
 use embedded_storage::nor_flash::NorFlash;
 
-use super::{Kept, Store, StoreError};
+use super::{Store, StoreError, Stored};
 use crate::persist::snapshot::{Resume, SnapshotError};
 
 /// What a robot does with the newest snapshot when it starts.
@@ -26,7 +26,7 @@ pub enum BootOutcome {
     /// It has none, for want of a snapshot that could be taken.
     Nothing,
     /// It has that of a snapshot.
-    Continued(Kept),
+    Continued(Stored),
 }
 
 /// What a start found in the store.
@@ -59,17 +59,17 @@ pub fn resume<FLASH: NorFlash>(
     report.outcome = BootOutcome::Nothing;
     let mut next = store.newest(buffer);
     loop {
-        let kept = match next {
-            Ok(Some(kept)) => kept,
+        let stored = match next {
+            Ok(Some(stored)) => stored,
             Ok(None) => return report,
             Err(error) => {
                 report.store = Some(error);
                 return report;
             }
         };
-        match restore(buffer.get(..kept.length).unwrap_or(&[]), place) {
+        match restore(buffer.get(..stored.length).unwrap_or(&[]), place) {
             Ok(()) => {
-                report.outcome = BootOutcome::Continued(kept);
+                report.outcome = BootOutcome::Continued(stored);
                 return report;
             }
             Err(error) => {
@@ -77,6 +77,6 @@ pub fn resume<FLASH: NorFlash>(
                 report.why = Some(error);
             }
         }
-        next = store.before(kept, buffer);
+        next = store.before(stored, buffer);
     }
 }

@@ -9,13 +9,13 @@
 //! # use embedded_storage::nor_flash::NorFlash;
 //! use toposlam::persist::store::{Store, StoreError};
 //!
-//! fn keep<FLASH: NorFlash>(flash: FLASH, snapshot: &[u8], buffer: &mut [u8]) -> Result<(), StoreError> {
+//! fn save<FLASH: NorFlash>(flash: FLASH, snapshot: &[u8], buffer: &mut [u8]) -> Result<(), StoreError> {
 //!     // The last 256 KiB of 1 MiB.
 //!     let mut store = Store::mount(flash, 0xC_0000..0x10_0000)?;
 //!     let starts = store.count_start()?;
 //!     store.save(snapshot)?;
-//!     if let Some(kept) = store.newest(buffer)? {
-//!         assert_eq!(buffer.get(..kept.length), Some(snapshot));
+//!     if let Some(stored) = store.newest(buffer)? {
+//!         assert_eq!(buffer.get(..stored.length), Some(snapshot));
 //!     }
 //!     # let _ = starts;
 //!     Ok(())
@@ -68,7 +68,7 @@ impl core::error::Error for StoreError {}
 
 /// A snapshot in the store.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Kept {
+pub struct Stored {
     /// Later snapshots have larger numbers.
     pub serial: u32,
     /// Its length in bytes.
@@ -83,7 +83,7 @@ struct Survey {
     /// The largest number in it.
     serial: u32,
     /// The newest complete snapshot below the number that was asked for.
-    newest: Option<Kept>,
+    newest: Option<Stored>,
     starts: u32,
     /// The bytes that its items take.
     used: usize,
@@ -175,7 +175,7 @@ impl<FLASH: NorFlash> Store<FLASH> {
     ///
     /// # Errors
     /// [`StoreError::Flash`], [`StoreError::NotReady`].
-    pub fn newest(&mut self, buffer: &mut [u8]) -> Result<Option<Kept>, StoreError> {
+    pub fn newest(&mut self, buffer: &mut [u8]) -> Result<Option<Stored>, StoreError> {
         self.newest_below(u32::MAX, buffer)
     }
 
@@ -183,8 +183,8 @@ impl<FLASH: NorFlash> Store<FLASH> {
     ///
     /// # Errors
     /// As [`Store::newest`].
-    pub fn before(&mut self, kept: Kept, buffer: &mut [u8]) -> Result<Option<Kept>, StoreError> {
-        self.newest_below(kept.serial, buffer)
+    pub fn before(&mut self, stored: Stored, buffer: &mut [u8]) -> Result<Option<Stored>, StoreError> {
+        self.newest_below(stored.serial, buffer)
     }
 
     /// Counts a start of the robot, and tells how many there were.
@@ -261,40 +261,40 @@ impl<FLASH: NorFlash> Store<FLASH> {
             if let Some((serial, length)) = assembly.take(&item)
                 && serial < below
             {
-                survey.newest = survey.newest.max(Some(Kept { serial, length }));
+                survey.newest = survey.newest.max(Some(Stored { serial, length }));
             }
         })?;
         Ok(survey)
     }
 
     #[inline(never)]
-    fn newest_below(&mut self, below: u32, buffer: &mut [u8]) -> Result<Option<Kept>, StoreError> {
+    fn newest_below(&mut self, below: u32, buffer: &mut [u8]) -> Result<Option<Stored>, StoreError> {
         let mut below = below;
         loop {
             let mut found = None;
             for half in 0..2 {
                 let newest = self.survey(half, below)?.newest;
-                if newest > found.map(|(kept, _)| kept) {
-                    found = newest.map(|kept| (kept, half));
+                if newest > found.map(|(stored, _)| stored) {
+                    found = newest.map(|stored| (stored, half));
                 }
             }
-            let Some((kept, half)) = found else { return Ok(None) };
-            if let Some(room) = buffer.get_mut(..kept.length)
-                && self.read(half, kept, room)?
+            let Some((stored, half)) = found else { return Ok(None) };
+            if let Some(room) = buffer.get_mut(..stored.length)
+                && self.read(half, stored, room)?
             {
-                return Ok(Some(kept));
+                return Ok(Some(stored));
             }
-            below = kept.serial;
+            below = stored.serial;
         }
     }
 
     /// Copies a snapshot; tells whether all of it was there.
     #[inline(never)]
-    fn read(&mut self, half: usize, kept: Kept, to: &mut [u8]) -> Result<bool, StoreError> {
+    fn read(&mut self, half: usize, stored: Stored, to: &mut [u8]) -> Result<bool, StoreError> {
         let mut is_complete = false;
         let mut assembly = Assembly::NONE;
         self.log(half)?.each(&mut |item| {
-            if item.serial() != kept.serial {
+            if item.serial() != stored.serial {
                 return;
             }
             if let Item::Piece { index, bytes, .. } = item {
@@ -364,8 +364,8 @@ impl<FLASH: NorFlash> Store<FLASH> {
     /// Erases the half that does not have the newest snapshot, and writes there from now on.
     #[inline(never)]
     fn change_halves(&mut self) -> Result<usize, StoreError> {
-        let kept = self.newest.or(self.current).unwrap_or(1);
-        let half = 1 - kept.min(1);
+        let stored = self.newest.or(self.current).unwrap_or(1);
+        let half = 1 - stored.min(1);
         let range = self.halves.get(half).cloned().ok_or(StoreError::Range)?;
         self.current = None;
         self.used = 0;
@@ -378,13 +378,13 @@ impl<FLASH: NorFlash> Store<FLASH> {
     }
 }
 
-impl PartialOrd for Kept {
+impl PartialOrd for Stored {
     fn partial_cmp(&self, other: &Self) -> Option<core::cmp::Ordering> {
         Some(self.cmp(other))
     }
 }
 
-impl Ord for Kept {
+impl Ord for Stored {
     /// By age: the later one is the greater.
     fn cmp(&self, other: &Self) -> core::cmp::Ordering {
         self.serial.cmp(&other.serial).then(self.length.cmp(&other.length))

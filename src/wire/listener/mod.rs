@@ -1,5 +1,5 @@
-//! The listener's side of the line: the map as it was heard.
+//! The listener's side of the line: a replica of the robot's map.
 
-mod picture;
+mod map_replica;
 
-pub use picture::Picture;
+pub use map_replica::MapReplica;

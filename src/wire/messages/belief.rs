@@ -1,5 +1,4 @@
-//! What the filter believes, in a form for the wire: where the robot may be, what became of the vertices, and what the
-//! map explains worst.
+//! The filter's belief: where the robot may be, how vertex ids changed, and which n-gram the map explains worst.
 
 use serde::{Deserialize, Serialize};
 
@@ -7,56 +6,56 @@ use super::List;
 use crate::wire::robot::bit;
 use crate::{Filter, VertexId, VertexSet};
 
-/// Where the robot may be, and how far the map itself is to be trusted.
+/// The belief of the filter after a place: where the robot may be, and how probable the map is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Belief {
     /// The number of the place since the start, from 0.
     pub place_index: u32,
-    /// The probability that the map is right, relative to its rivals, in thousandths.
+    /// The probability of the map among the maps of all hypotheses, in thousandths.
     pub map_permille: u16,
-    /// The most probable vertices, the most probable first; what is missing to 1000 is elsewhere.
-    pub places: List<PlaceProbability, 8>,
+    /// The most probable vertices, the most probable first. The rest up to 1000 belongs to other vertices.
+    pub vertices: List<VertexProbability, 8>,
 }
 
-/// How probable it is that the robot is at a vertex.
+/// The probability that the robot is at a vertex.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-pub struct PlaceProbability {
-    /// The number of the vertex.
+pub struct VertexProbability {
+    /// The vertex.
     pub vertex: u8,
     /// The probability in thousandths.
     pub permille: u16,
 }
 
 impl Belief {
-    /// What a filter believes after a place.
+    /// The belief of a filter after a place. Cost: O(8 · V).
     pub fn of<const V: usize>(filter: &impl Filter<V>, place_index: u32) -> Self {
-        let mut places = [PlaceProbability::default(); 8];
+        let mut most_probable = [VertexProbability::default(); 8];
         for vertex in filter.map().vertices() {
-            let mut place =
-                PlaceProbability { vertex: vertex.into(), permille: permille(filter.place_probability_q16(vertex)) };
-            for slot in &mut places {
-                if place.permille > slot.permille {
-                    core::mem::swap(slot, &mut place);
+            let permille = permille(filter.place_probability_q16(vertex));
+            let mut candidate = VertexProbability { vertex: vertex.into(), permille };
+            for slot in &mut most_probable {
+                if candidate.permille > slot.permille {
+                    core::mem::swap(slot, &mut candidate);
                 }
             }
         }
-        let places = List::new(places.into_iter().take_while(|place| place.permille > 0));
-        Self { place_index, map_permille: permille(filter.map_probability_q16()), places }
+        let vertices = List::new(most_probable.into_iter().take_while(|candidate| candidate.permille > 0));
+        Self { place_index, map_permille: permille(filter.map_probability_q16()), vertices }
     }
 
-    /// The same belief under new numbers: a vertex that is gone is left out, and those that are one now are added up.
-    pub(in crate::wire) fn rename(&mut self, renamed: &Renamed) {
-        let mut places = [PlaceProbability::default(); 8];
+    /// Applies new vertex ids: removed vertices are left out, the probabilities of merged ones are added.
+    pub(in crate::wire) fn remap(&mut self, remapped: &Remapped) {
+        let mut vertices = [VertexProbability::default(); 8];
         let mut count = 0;
-        for &PlaceProbability { vertex, permille } in self.places.as_slice() {
-            let Some(vertex) = renamed.now(vertex) else { continue };
-            let held = places.iter().take(count).position(|place| place.vertex == vertex);
-            if let Some(place) = places.get_mut(held.unwrap_or(count)) {
-                *place = PlaceProbability { vertex, permille: place.permille.saturating_add(permille) };
-                count += usize::from(held.is_none());
+        for &VertexProbability { vertex, permille } in self.vertices.as_slice() {
+            let Some(vertex) = remapped.now(vertex) else { continue };
+            let known = vertices.iter().take(count).position(|entry| entry.vertex == vertex);
+            if let Some(entry) = vertices.get_mut(known.unwrap_or(count)) {
+                *entry = VertexProbability { vertex, permille: entry.permille.saturating_add(permille) };
+                count += usize::from(known.is_none());
             }
         }
-        self.places = List::new(places.into_iter().take(count));
+        self.vertices = List::new(vertices.into_iter().take(count));
     }
 }
 
@@ -64,39 +63,39 @@ fn permille(probability_q16: u32) -> u16 {
     ((u64::from(probability_q16.min(1 << 16)) * 1000 + (1 << 15)) >> 16) as u16
 }
 
-/// The number of each vertex after an update, for each number before it.
+/// The vertex ids changed: for each id before the update, the id after it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-pub struct Renamed {
+pub struct Remapped {
     /// The number of the place since the start, from 0.
     pub place_index: u32,
-    /// For vertex 0, 1, … before the update its number now, 255 when it is gone; later vertices keep their numbers. Two
-    /// with the same number were merged.
-    pub names: List<u8, 64>,
+    /// For vertex 0, 1, … before the update its id after it, 255 if the vertex was removed. Vertices beyond the list keep
+    /// their ids. Vertices with the same new id were merged.
+    pub vertices: List<u8, 64>,
 }
 
-impl Renamed {
-    pub(in crate::wire) const GONE: u8 = u8::MAX;
+impl Remapped {
+    pub(in crate::wire) const REMOVED: u8 = u8::MAX;
 
-    /// What the last update of a filter did to the numbers of the first so many vertices; `None` when all kept theirs.
+    /// The id changes of a filter's last update among the first `vertices` ids; `None` if no id changed.
     pub fn of<const V: usize>(filter: &impl Filter<V>, vertices: u8, place_index: u32) -> Option<Self> {
-        let before = VertexId::first(vertices.into());
-        let last = before.rev().find(|&vertex| filter.renamed(vertex) != Some(vertex))?;
-        let now = |vertex| filter.renamed(vertex).map_or(Self::GONE, u8::from);
-        let names = VertexId::first(last.index() + 1).map(now);
-        Some(Self { place_index, names: List::new(names) })
+        let mut before = VertexId::first(vertices.into());
+        let last_changed = before.rfind(|&vertex| filter.renamed(vertex) != Some(vertex))?;
+        let new_id = |vertex| filter.renamed(vertex).map_or(Self::REMOVED, u8::from);
+        let new_ids = VertexId::first(last_changed.index() + 1).map(new_id);
+        Some(Self { place_index, vertices: List::new(new_ids) })
     }
 
-    /// The number now of a vertex by its number before; `None` when it is gone.
+    /// The id of a vertex after the update, by its id before; `None` if it was removed.
     pub fn now(&self, before: u8) -> Option<u8> {
-        match self.names.as_slice().get(usize::from(before)) {
+        match self.vertices.as_slice().get(usize::from(before)) {
             None => Some(before),
-            Some(&Self::GONE) => None,
+            Some(&Self::REMOVED) => None,
             Some(&now) => Some(now),
         }
     }
 
-    /// Renumbers the vertices of a map, labels and rows; `labelled` are the vertices whose label is known, before and now.
-    /// Of vertices that are one now, the first one's label stays, and the edges of all; a vertex beyond `V` is left out.
+    /// Applies the new ids to the labels and rows of a map. `labelled` is the set of vertices with a known label; the result is
+    /// the same set after the update. Merged vertices keep the first label and all edges; ids from `V` on are dropped.
     pub(in crate::wire) fn apply<const V: usize>(
         &self,
         labels: &mut [(u16, u32); V],
@@ -126,37 +125,37 @@ impl Renamed {
         labelled_now
     }
 
-    /// How many vertices there are now, if there were so many before and none was added.
-    pub(in crate::wire) fn vertices(&self, before: u8) -> u8 {
+    /// The number of vertices after the update, without vertices that it added.
+    pub(in crate::wire) fn count(&self, before: u8) -> u8 {
         (0..before).filter_map(|vertex| self.now(vertex)).map(|now| now.saturating_add(1)).max().unwrap_or(0)
     }
 }
 
-/// What the map explains worst: the n-gram of the history that is farthest from every walk of the map.
+/// The n-gram of the history with the largest distance to the map (the directed half of Eq. 2).
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Worst {
     /// The number of the place since the start, from 0.
     pub place_index: u32,
-    /// How far it is from the nearest walk, in millimetres; 65535 when there is none.
+    /// Its distance to the nearest walk of the map in millimetres; 65535 if the map has no walk of its length.
     pub distance_mm: u16,
     /// How many places ago its newest label was observed; 0 for the newest place.
     pub newest_age: u16,
-    /// The vertices of the nearest walk, the oldest first; empty when only the distance is known.
+    /// The vertices of the nearest walk, the oldest first; empty if only the distance is known.
     pub vertices: List<u8, 7>,
 }
 
 impl Worst {
-    /// What the map of a filter explains worst after a place.
+    /// The worst n-gram of a filter after a place.
     pub fn of<const V: usize>(filter: &impl Filter<V>, place_index: u32) -> Self {
         let worst = filter.worst();
         let vertices = List::new(worst.walk().iter().map(|&vertex| vertex.into()));
         Self { place_index, distance_mm: worst.distance_mm, newest_age: worst.newest_age, vertices }
     }
 
-    /// The same under new numbers; `None` when a vertex of the walk is gone.
-    pub(in crate::wire) fn renamed(self, renamed: &Renamed) -> Option<Self> {
+    /// The same n-gram under the new vertex ids; `None` if a vertex of the walk was removed.
+    pub(in crate::wire) fn remapped(self, remapped: &Remapped) -> Option<Self> {
         let walk = self.vertices.as_slice();
-        let vertices = List::new(walk.iter().filter_map(|&vertex| renamed.now(vertex)));
+        let vertices = List::new(walk.iter().filter_map(|&vertex| remapped.now(vertex)));
         (vertices.as_slice().len() == walk.len()).then_some(Self { vertices, ..self })
     }
 }

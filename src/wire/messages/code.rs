@@ -1,7 +1,6 @@
-//! Kinds that are one byte on the wire, so that one that is appended later costs an old listener nothing but its name.
+//! Enums that are one byte on the wire, so that old listeners can read numbers that are appended later.
 
-/// An enum without fields that travels as a `u8`. The first variant has number 0, and every number that is not known here
-/// is read as it.
+/// Defines an enum without fields that is a `u8` on the wire. The first variant has the number 0; unknown numbers decode to it.
 macro_rules! codes {
     (
         $(#[$about:meta])*
@@ -21,7 +20,7 @@ macro_rules! codes {
         }
 
         impl $name {
-            /// Every one, in the order of its number.
+            /// All variants in the order of their numbers.
             pub const ALL: &[Self] = &[Self::$other, $(Self::$variant,)*];
         }
 

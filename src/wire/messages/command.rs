@@ -1,74 +1,73 @@
-//! What a robot can be told. Append-only: a variant is never changed, moved or removed once released (`docs/wire.md`,
-//! Stability).
+//! The commands to a robot. Append-only within a frame version (`docs/wire.md`, Stability).
 
 use serde::{Deserialize, Serialize};
 
 use super::{List, Setting};
 
-/// The most bytes of a snapshot that one request or reply carries.
+/// The most bytes of a snapshot in one request or reply.
 pub const CHUNK_BYTES: usize = 64;
 
-/// A piece of a snapshot.
+/// A chunk of a snapshot.
 pub type Chunk = List<u8, CHUNK_BYTES>;
 
-/// A command with a number, by which its reply is known. A client that hears no reply sends the same request again, and the
-/// robot executes it once.
+/// A command with an id, which its reply repeats. A client that receives no reply sends the same request again; the robot
+/// executes it once.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Request {
-    /// The number of the request; it differs from that of the request before.
+    /// The id of the request, different from that of the previous request.
     pub id: u16,
-    /// What to do.
+    /// The command.
     pub command: Command,
 }
 
-/// What a robot is told to do.
+/// A command to a robot.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[non_exhaustive]
 pub enum Command {
-    /// Say which robot this is and what it does; the reply is [`Outcome::Info`](super::Outcome::Info).
+    /// Requests the state of the robot; the outcome is [`Outcome::Info`](super::Outcome::Info).
     Info,
-    /// Send the whole rolling picture at once, introduction included.
+    /// Requests the whole map, beginning with a `Hello`.
     GetMap,
-    /// Send a piece of a snapshot; the reply is [`Outcome::Snapshot`](super::Outcome::Snapshot).
+    /// Requests a chunk of a snapshot; the outcome is [`Outcome::Snapshot`](super::Outcome::Snapshot).
     GetSnapshot {
-        /// The first byte of the piece. With 0 a snapshot is taken; other pieces are of the one that was taken last.
+        /// The first byte of the chunk. Offset 0 takes a new snapshot; other chunks are of the snapshot taken last.
         offset: u16,
     },
-    /// Get ready for a snapshot to be restored; what was sent before is dropped.
+    /// Starts the transfer of a snapshot to be restored. Chunks sent before are dropped.
     RestoreBegin {
-        /// How many bytes it has.
+        /// The length of the snapshot in bytes.
         length: u16,
-        /// CRC-32 ISO-HDLC of all its bytes.
+        /// The CRC-32 ISO-HDLC of all its bytes.
         crc: u32,
     },
-    /// Take a piece of the snapshot to be restored. Pieces come in order; a piece may come again.
+    /// Transfers a chunk of the snapshot to be restored. Chunks come in order; a chunk may be repeated.
     RestoreChunk {
-        /// The first byte of the piece.
+        /// The first byte of the chunk.
         offset: u16,
         /// Its bytes.
         bytes: Chunk,
     },
-    /// Go on with the map of the snapshot that was sent. When that is refused, everything stays as it was.
+    /// Restores the snapshot that was transferred. If it is refused, nothing changes.
     RestoreCommit,
-    /// Forget the map and start anew.
+    /// Clears the map and starts again.
     Reset,
-    /// Go on with another setting.
+    /// Changes one setting.
     SetConfig(Setting),
-    /// Keep the map as it is and only tell where the robot is, or go on mapping.
+    /// Switches between localisation in the present map and mapping.
     LocaliseOnly {
-        /// Whether the map is kept.
+        /// Whether the robot only localises.
         on: bool,
     },
-    /// Drive to a vertex of the map; [`Message::Journey`](super::Message::Journey) tells how that goes.
+    /// Sends the robot to a vertex; [`Message::GoalStatus`](super::Message::GoalStatus) reports the progress.
     GoTo {
-        /// The number of the vertex.
+        /// The vertex.
         vertex: u8,
     },
-    /// Go on exploring.
+    /// Makes the robot explore.
     Explore,
-    /// Stand still and observe nothing, or go on.
+    /// Pauses or resumes the robot. A paused robot stands still and ignores its sensors.
     Pause {
-        /// Whether to stand still.
+        /// Whether the robot pauses.
         on: bool,
     },
 }

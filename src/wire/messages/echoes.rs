@@ -1,4 +1,4 @@
-//! One reading of the ring in a form that takes few bytes on the wire.
+//! The echoes of one ring frame in a compact form.
 
 use core::fmt;
 
@@ -24,10 +24,10 @@ impl Echoes {
     const SILENCE: u16 = 1;
     const RANGES: u16 = 2;
 
-    /// No echo at all.
+    /// No echoes.
     pub const EMPTY: Self = Self { count: 0, codes: [Self::DEAD; Self::MAX] };
 
-    /// The echoes of a ring frame; those beyond [`Self::MAX`] are left out, and a range above 65533 mm becomes that.
+    /// The first [`Self::MAX`] echoes of a ring frame; ranges saturate at 65533 mm.
     pub fn new(echoes: &[Echo]) -> Self {
         let mut this = Self::EMPTY;
         for (code, echo) in this.codes.iter_mut().zip(echoes) {
@@ -107,13 +107,13 @@ mod tests {
     use super::*;
 
     #[test]
-    fn every_kind_of_echo_comes_back_as_it_went_in() {
+    fn every_kind_of_echo_round_trips() {
         let ring = [Echo::Dead, Echo::Silence, Echo::Range { range_mm: 0 }, Echo::Range { range_mm: 65533 }];
         assert_eq!(Echoes::new(&ring).iter().collect::<Vec<_>>(), ring);
     }
 
     #[test]
-    fn what_has_no_room_is_left_out_and_what_is_too_far_saturates() {
+    fn echoes_beyond_the_capacity_are_dropped_and_far_ranges_saturate() {
         let ring = [Echo::Range { range_mm: u16::MAX }; Echoes::MAX + 1];
         let echoes = Echoes::new(&ring);
         assert_eq!(echoes.iter().count(), Echoes::MAX);

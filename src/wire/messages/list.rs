@@ -1,4 +1,4 @@
-//! A few elements of one kind, in a form that takes as many bytes on the wire as there are elements.
+//! A list of bounded length; on the wire it takes only the bytes of its elements.
 
 use core::fmt;
 use core::marker::PhantomData;
@@ -15,7 +15,7 @@ pub struct List<T, const MAX: usize> {
 }
 
 impl<T: Copy + Default, const MAX: usize> List<T, MAX> {
-    /// The elements of an iterator; those beyond `MAX` are left out.
+    /// A list of the first `MAX` elements of an iterator.
     pub fn new(elements: impl IntoIterator<Item = T>) -> Self {
         let mut list = Self::default();
         for (slot, element) in list.elements.iter_mut().zip(elements) {
@@ -68,7 +68,7 @@ impl<'de, T: Deserialize<'de> + Copy + Default, const MAX: usize> Visitor<'de> f
     type Value = List<T, MAX>;
 
     fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str("no more elements than the list has room for")
+        f.write_str("at most as many elements as the list has room for")
     }
 
     fn visit_seq<A: SeqAccess<'de>>(self, mut sequence: A) -> Result<Self::Value, A::Error> {
@@ -92,13 +92,13 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_has_no_room_is_left_out() {
+    fn elements_beyond_the_capacity_are_dropped() {
         assert_eq!(List::<u8, 3>::new([1, 2]).as_slice(), [1, 2]);
         assert_eq!(List::<u8, 3>::new(1..=9).as_slice(), [1, 2, 3]);
     }
 
     #[test]
-    fn a_longer_list_is_no_list() {
+    fn a_longer_list_is_rejected() {
         assert_eq!(postcard::from_bytes::<List<u8, 3>>(&[3, 1, 2, 3]), Ok(List::new([1, 2, 3])));
         assert!(postcard::from_bytes::<List<u8, 3>>(&[4, 1, 2, 3, 4]).is_err());
     }

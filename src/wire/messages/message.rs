@@ -1,26 +1,26 @@
-//! The messages. Append-only: a variant is never changed, moved or removed once released (`docs/wire.md`, Stability).
+//! The messages of the robot. Append-only within a frame version (`docs/wire.md`, Stability).
 
 use core::fmt;
 
 use serde::{Deserialize, Serialize};
 
 use super::code::codes;
-use super::{Belief, Drive, Echoes, Journey, Renamed, Reply, Worst};
+use super::{Belief, Echoes, Evidence, GoalStatus, Remapped, Reply, Velocity, Worst};
 use crate::{Filter, FilterCapacities, Fingerprint, MapperConfig, Update};
 
-/// The version of the messages and requests; it grows by one whenever some are appended.
-pub const PROTOCOL_VERSION: u16 = 3;
+/// The version of the messages and requests.
+pub const PROTOCOL_VERSION: u16 = 4;
 
-/// FNV-1a (64 bit) of the description of all messages and requests that `docs/wire.md` prints; a test recomputes it from the types.
-pub const SCHEMA_HASH: u64 = 0x06A5_446B_0B1D_C83D;
+/// The 64-bit FNV-1a hash of the schema in `docs/wire.md`; a test computes it from the types.
+pub const SCHEMA_HASH: u64 = 0x8352_6E81_4B95_713B;
 
-/// One message from the robot. All of them but [`Message::Renamed`] state facts in absolute terms and are no increment.
+/// A message from the robot. Every message but [`Message::Remapped`] gives absolute values, not increments.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[non_exhaustive]
 pub enum Message {
-    /// Who is speaking: sent first after the start and again every so many ticks.
+    /// The robot introduces itself: first after the start, then periodically.
     Hello(Hello),
-    /// The detector confirmed a place (what it saw, before any inference).
+    /// The detector confirmed a visit to a place: the measurement, before any inference.
     Place {
         /// The number of the place since the start, from 0.
         place_index: u32,
@@ -28,86 +28,86 @@ pub enum Message {
         frame_index: u32,
         /// The radius of the largest free disc around the place, in millimetres.
         radius_mm: u16,
-        /// How many ways lead away from the place, when the detector could count them.
+        /// The number of ways that lead away from the place; `None` if the detector could not count them.
         degree: Option<u8>,
     },
-    /// How large the map now is, and a digest of it.
+    /// The size of the map and its digest.
     Map {
-        /// The number of vertices; vertices from this number on do not exist (any more).
+        /// The number of vertices. Vertices with this id or a higher one do not exist.
         vertices: u8,
         /// The number of edges, self-loops included.
         edges: u16,
-        /// CRC-32 of the map's canonical bytes, see [`map_digest`](crate::wire::map_digest).
+        /// The CRC-32 of the map's canonical bytes, see [`map_digest`](crate::wire::map_digest).
         digest: u32,
     },
-    /// The label of a vertex is now this.
+    /// The label of a vertex.
     Vertex {
-        /// The number of the vertex.
+        /// The vertex.
         vertex: u8,
-        /// The mean radius observed there, in millimetres.
+        /// The mean of the radii observed there, in millimetres.
         radius_mm: u16,
-        /// How many observations the mean is made of.
+        /// The number of observations in the mean.
         visits: u32,
     },
-    /// An edge now exists, or does no longer: another hypothesis may have become the best one.
+    /// An edge was added or removed. An edge can be removed when another hypothesis becomes the best one.
     Edge {
-        /// The vertex with the smaller number.
+        /// The vertex with the smaller id.
         a: u8,
-        /// The vertex with the larger number; equal to `a` for a self-loop.
+        /// The vertex with the larger id; equal to `a` for a self-loop.
         b: u8,
         /// Whether the edge exists.
         present: bool,
     },
-    /// The robot is at this vertex.
+    /// The vertex that the robot is at.
     Location(Location),
-    /// Why the inference believes so.
+    /// Why the filter chose its best map.
     Evidence(Evidence),
-    /// One vertex of the rolling full picture.
+    /// One vertex with its edges, from the repetition of the map.
     Row(Row),
-    /// How often a kind of fault was seen since the start.
+    /// The count of one kind of fault since the start.
     Fault {
         /// The number of the [`FaultKind`](crate::FaultKind).
         kind: u8,
         /// The count since the start; it saturates.
         count: u32,
     },
-    /// How the firmware is doing.
+    /// The state of the firmware.
     Health(Health),
-    /// One reading of the sonar ring, for viewers.
+    /// One frame of the sonar ring, for viewers.
     Ring {
         /// The number of the ring frame since the start, from 0; it wraps.
         frame_index: u32,
-        /// What each sonar said, in the order of the ring's geometry.
+        /// The echo of each sensor, in the order of the ring's geometry.
         echoes: Echoes,
     },
-    /// Where the robot may be, and how far the map is to be trusted.
+    /// Where the robot may be, and how probable the map is.
     Belief(Belief),
-    /// The vertices have new numbers from here on: some were merged, split off, left out or put in another order.
-    Renamed(Renamed),
-    /// What the map explains worst.
+    /// The vertex ids changed: vertices were merged, split, removed or reordered.
+    Remapped(Remapped),
+    /// The n-gram of the history that the map explains worst.
     Worst(Worst),
     /// The answer to a request.
     Reply(Reply),
-    /// Where the drive steers, once for each ring frame.
-    Drive(Drive),
-    /// How the way to a vertex goes that the robot was told to go to.
-    Journey(Journey),
+    /// The velocity command of one ring frame.
+    Velocity(Velocity),
+    /// The status of the goal, whenever it changes.
+    GoalStatus(GoalStatus),
 }
 
-/// Who is speaking.
+/// The introduction of a robot.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Hello {
-    /// The speaker's [`PROTOCOL_VERSION`].
+    /// The [`PROTOCOL_VERSION`] of the robot.
     pub protocol_version: u16,
-    /// The speaker's [`SCHEMA_HASH`].
+    /// The [`SCHEMA_HASH`] of the robot.
     pub schema_hash: u64,
-    /// A number that differs from one start of the robot to the next (a counter in flash, or noise); 0 when it has none.
+    /// A number that differs from one start of the robot to the next (a counter in flash, or noise); 0 if there is none.
     pub boot: u32,
     /// Why the robot started.
     pub reset_cause: ResetCause,
-    /// The seed of the random draws, with which a host can repeat the run.
+    /// The seed of the random draws. A host can repeat the run with it.
     pub seed: u64,
-    /// What the robot has room for.
+    /// The capacities of the robot.
     pub capacities: Capacities,
 }
 
@@ -117,13 +117,13 @@ impl Hello {
         Self { protocol_version: PROTOCOL_VERSION, schema_hash: SCHEMA_HASH, boot, reset_cause, seed, capacities }
     }
 
-    /// Whether this version of the library understands the speaker.
+    /// Checks that this version of the library understands the robot.
     ///
-    /// A speaker with another protocol version is understood as far as the messages known to both go, because messages
-    /// are only ever appended.
+    /// Within a frame version messages are only appended. So of a robot with another protocol version, the messages that
+    /// both sides know are understood.
     ///
     /// # Errors
-    /// [`HelloError::SchemaDiffers`] when the speaker claims the same protocol version with other messages.
+    /// [`HelloError::SchemaDiffers`] if the protocol versions are equal and the schemas are not.
     pub const fn check(&self) -> Result<(), HelloError> {
         if self.protocol_version == PROTOCOL_VERSION && self.schema_hash != SCHEMA_HASH {
             return Err(HelloError::SchemaDiffers { ours: SCHEMA_HASH, theirs: self.schema_hash });
@@ -135,7 +135,7 @@ impl Hello {
 codes! {
     /// Why a robot started.
     ResetCause {
-        /// Nobody can tell.
+        /// The cause is unknown.
         Unknown => "for an unknown reason",
         /// The power was switched on.
         PowerOn = 1 => "the power was switched on",
@@ -144,33 +144,33 @@ codes! {
         /// The reset pin was pulled.
         ResetPin = 3 => "the reset pin was pulled",
         /// The watchdog was not fed in time.
-        Watchdog = 4 => "the watchdog was not fed",
-        /// The program asked for it.
-        Software = 5 => "the program restarted itself",
-        /// The chip was to sleep in a way that it may not.
-        LowPower = 6 => "the chip went to sleep wrongly",
+        Watchdog = 4 => "the watchdog was not fed in time",
+        /// The program requested a reset.
+        Software = 5 => "the program requested a reset",
+        /// The chip entered a low-power mode that the firmware forbids.
+        LowPower = 6 => "the chip entered a forbidden low-power mode",
     }
 }
 
-/// What the robot has room for, and the units it counts in.
+/// The capacities of a robot, and the unit of its labels.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Capacities {
-    /// The most vertices a map can have, 1 to 64.
+    /// The most vertices of a map, 1 to 64.
     pub vertices: u8,
-    /// The number of hypotheses (particles).
+    /// The number of hypotheses, or of particles.
     pub hypotheses: u16,
-    /// The most observations the history holds.
+    /// The most observations in the history.
     pub history: u16,
     /// The length n of the n-grams.
     pub ngram_length: u8,
-    /// The width of one fingerprint step, in millimetres.
+    /// The resolution of the labels in millimetres.
     pub fingerprint_step_mm: u8,
     /// The number of sonars in the ring.
     pub sonars: u8,
 }
 
 impl Capacities {
-    /// What a robot has room for whose maps have so many vertices.
+    /// The capacities of a robot with maps of this many vertices.
     pub const fn new(vertices: u8, filter: FilterCapacities, sonars: u8) -> Self {
         let FilterCapacities { hypotheses, history, ngram_length } = filter;
         let fingerprint_step_mm = Fingerprint::STEP_MM as u8;
@@ -190,14 +190,14 @@ impl Capacities {
 pub struct Location {
     /// The number of the place since the start, from 0.
     pub place_index: u32,
-    /// The vertex that the place was taken for.
+    /// The vertex that the place belongs to.
     pub vertex: u8,
 }
 
 impl Location {
-    /// The same place under new numbers; `None` when its vertex is gone.
-    pub(in crate::wire) fn renamed(self, renamed: &Renamed) -> Option<Self> {
-        Some(Self { vertex: renamed.now(self.vertex)?, ..self })
+    /// The same location under the new vertex ids; `None` if the vertex was removed.
+    pub(in crate::wire) fn remapped(self, remapped: &Remapped) -> Option<Self> {
+        Some(Self { vertex: remapped.now(self.vertex)?, ..self })
     }
 }
 
@@ -207,74 +207,41 @@ impl From<&Update> for Location {
     }
 }
 
-/// Why the inference believes in its map. Logarithms are natural and in units of 2⁻¹⁶ nats.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-pub struct Evidence {
-    /// The number of the place since the start, from 0.
-    pub place_index: u32,
-    /// The distance of Eq. 2, or of the half of it that is configured, in millimetres; 65535 when it is infinite.
-    pub consistency_mm: u16,
-    /// The logarithm of the winner's Eq. 7: how well the observation fits the label its vertex had before.
-    pub ln_label_q16: i32,
-    /// The logarithm of the winner's Eq. 8: how consistent the map is with the evidence.
-    pub ln_consistency_q16: i32,
-    /// The logarithm of the winner's Eq. 9: what the size of the map costs.
-    pub ln_size_q16: i32,
-    /// By how much the logarithm of the winner's weight leads that of the runner-up; 15 nats or more are reported as 15.
-    pub lead_q16: i32,
-    /// How many different hypotheses survived.
-    pub distinct_hypotheses: u16,
-}
-
-impl From<&Update> for Evidence {
-    fn from(update: &Update) -> Self {
-        Self {
-            place_index: update.place_index,
-            consistency_mm: update.consistency_mm,
-            ln_label_q16: update.factors.ln_label_q16,
-            ln_consistency_q16: update.factors.ln_consistency_q16,
-            ln_size_q16: update.factors.ln_size_q16,
-            lead_q16: update.lead_q16,
-            distinct_hypotheses: u16::from(update.distinct),
-        }
-    }
-}
-
-/// All that the map says about one vertex.
+/// One vertex of the map: its label and its edges.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Row {
-    /// The number of the vertex.
+    /// The vertex.
     pub vertex: u8,
-    /// The mean radius observed there, in millimetres.
+    /// The mean of the radii observed there, in millimetres.
     pub radius_mm: u16,
-    /// How many observations the mean is made of.
+    /// The number of observations in the mean.
     pub visits: u32,
-    /// The neighbours as a bit row: bit `w` says that an edge joins this vertex and vertex `w`.
+    /// The neighbours as a set of bits: bit `w` is set if an edge joins this vertex and vertex `w`.
     pub neighbours: u64,
 }
 
-/// How the firmware is doing; a value that the firmware does not measure is 0.
+/// The state of the firmware. A value that the firmware does not measure is 0.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Health {
     /// Time since the start in milliseconds; it wraps.
     pub uptime_ms: u32,
-    /// How often the main loop went round; it wraps.
+    /// The number of turns of the main loop; it wraps.
     pub loop_count: u32,
-    /// The most stack that was ever in use, in bytes.
+    /// The largest stack use since the start, in bytes.
     pub stack_high_water_bytes: u32,
-    /// The longest time that one place took, in microseconds.
-    pub worst_update_us: u32,
+    /// The longest time that one turn of the main loop took, in microseconds.
+    pub worst_turn_us: u32,
 }
 
-/// Why a speaker is not understood.
+/// Why a robot is not understood.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum HelloError {
-    /// Both sides have the same protocol version, yet their messages differ.
+    /// Both sides have the same protocol version and different schemas.
     SchemaDiffers {
         /// The schema hash of this library.
         ours: u64,
-        /// The schema hash of the speaker.
+        /// The schema hash of the robot.
         theirs: u64,
     },
 }
@@ -283,7 +250,7 @@ impl fmt::Display for HelloError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::SchemaDiffers { ours, theirs } => {
-                write!(f, "the speaker's messages have schema hash {theirs:#018x}, this listener knows {ours:#018x}")
+                write!(f, "the schema hash of the robot is {theirs:#018x}, that of this listener {ours:#018x}")
             }
         }
     }

@@ -1,4 +1,4 @@
-//! What a frame can hold: a message from the robot, or a request to it.
+//! The payload of a frame: a message from the robot, or a request to it.
 
 use serde::Serialize;
 use serde::de::DeserializeOwned;
@@ -6,12 +6,12 @@ use serde::de::DeserializeOwned;
 use super::{Message, Request};
 use crate::wire::FRAME_VERSION;
 
-/// What a frame can hold: [`Message`] and [`Request`], and nothing else.
+/// The payload of a frame: a [`Message`] or a [`Request`].
 pub trait Payload: Serialize + DeserializeOwned + sealed::Sealed {
-    /// The first byte of the frame: the frame version, and which way the frame goes.
+    /// The first byte of the frame: the frame version and the direction.
     const VERSION: u8;
 
-    /// The number of the sender's start, when it introduces itself.
+    /// The number of the sender's start, in a `Hello`.
     fn boot(&self) -> Option<u32>;
 }
 

@@ -1,37 +1,37 @@
-//! What a robot answers to a request.
+//! The replies of a robot to requests.
 
 use serde::{Deserialize, Serialize};
 
 use super::code::codes;
 use super::{Chunk, ResetCause};
 
-/// The answer to a request.
+/// The reply to a request.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Reply {
-    /// The number of the request.
+    /// The id of the request.
     pub request: u16,
-    /// What came of it.
+    /// The outcome of the request.
     pub outcome: Outcome,
 }
 
-/// What came of a request. Append-only.
+/// The outcome of a request. Append-only.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[non_exhaustive]
 pub enum Outcome {
-    /// It is done, or under way.
+    /// The command was accepted.
     Done,
-    /// Which robot this is and what it does.
+    /// The state of the robot.
     Info(Info),
-    /// A piece of a snapshot.
+    /// A chunk of a snapshot.
     Snapshot {
-        /// How many bytes the whole snapshot has.
+        /// The length of the whole snapshot in bytes.
         total: u16,
-        /// The first byte of the piece.
+        /// The first byte of the chunk.
         offset: u16,
-        /// Its bytes; none beyond the end.
+        /// Its bytes; none at the end of the snapshot.
         bytes: Chunk,
     },
-    /// It was not done, and everything is as it was.
+    /// The command was refused; nothing has changed.
     Refused(Refusal),
 }
 
@@ -47,37 +47,37 @@ impl From<Result<(), Refusal>> for Outcome {
     }
 }
 
-/// Which robot this is and what it does.
+/// The state of a robot.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Info {
-    /// The version of the library: major, minor, patch.
+    /// The version of the library.
     pub version: Version,
-    /// The number of this start; 0 when the robot has none.
+    /// The number of this start; 0 if there is none.
     pub boot: u32,
-    /// Why it started.
+    /// Why the robot started.
     pub reset_cause: ResetCause,
     /// Time since the start in milliseconds; it wraps.
     pub uptime_ms: u32,
-    /// Whether it was told to stand still.
+    /// Whether the robot is paused.
     pub paused: bool,
-    /// Whether it keeps the map as it is.
+    /// Whether the robot only localises.
     pub localise_only: bool,
-    /// The vertex it was told to go to and has not reached.
-    pub going_to: Option<u8>,
-    /// The size of the newest snapshot that outlasts a loss of power, in bytes; 0 when there is none.
+    /// The goal, while the robot is on its way.
+    pub goal: Option<u8>,
+    /// The size of the newest stored snapshot in bytes; 0 if there is none.
     pub stored_bytes: u16,
-    /// How many places were observed since that snapshot was taken.
+    /// The number of places since that snapshot.
     pub stored_places_ago: u32,
 }
 
 /// The version of the library.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Version {
-    /// It grows with what breaks a program.
+    /// Raised by breaking changes.
     pub major: u8,
-    /// It grows with what is added.
+    /// Raised by additions.
     pub minor: u8,
-    /// It grows with what is mended.
+    /// Raised by fixes.
     pub patch: u8,
 }
 
@@ -90,41 +90,41 @@ impl Version {
     };
 }
 
-/// A part of the version, read at compile time; one beyond 255 does not compile.
+/// Parses a part of the version at compile time; a part above 255 does not compile.
 const fn number(text: &str) -> u8 {
     match u8::from_str_radix(text, 10) {
         Ok(number) => number,
-        Err(_) => panic!("a part of the version is no number up to 255"),
+        Err(_) => panic!("a part of the version is not a number up to 255"),
     }
 }
 
 codes! {
     /// Why a request was refused.
     Refusal {
-        /// A reason that is not known here.
-        Other => "for a reason that is not known here",
-        /// The robot has no part that could do it.
-        Unsupported = 1 => "this robot has no part that could do it",
+        /// A reason that this version does not know.
+        Other => "for an unknown reason",
+        /// The robot does not support the command.
+        Unsupported = 1 => "this robot does not support the command",
         /// A value is out of its range.
         OutOfRange = 2 => "a value is out of its range",
         /// The map has no such vertex.
         UnknownVertex = 3 => "the map has no such vertex",
-        /// No way through the map leads there.
-        NoRoute = 4 => "no way through the map leads there",
-        /// There is nowhere to keep a snapshot.
-        NoStore = 5 => "there is nowhere to keep a snapshot",
-        /// What has to come before it has not come.
-        NotNow = 6 => "what has to come before it has not come",
-        /// Bytes before the piece, or before the end, were not received.
-        MissingChunk = 7 => "bytes before it were not received",
-        /// The snapshot is longer than the robot has room for.
-        TooLong = 8 => "the snapshot is longer than the robot has room for",
-        /// The bytes received are not those whose CRC was told.
-        BadCrc = 9 => "the bytes received are not those that were announced",
-        /// The snapshot is intact but of another version or other capacities, or contradicts itself.
-        BadSnapshot = 10 => "the snapshot does not fit this robot or contradicts itself",
-        /// The robot is doing something that must end first.
-        Busy = 11 => "something else must end first",
+        /// No path of the map leads to the vertex.
+        NoRoute = 4 => "no path of the map leads there",
+        /// The robot cannot store snapshots.
+        NoStore = 5 => "the robot cannot store snapshots",
+        /// A command that must precede this one is missing.
+        NotNow = 6 => "a command that must precede this one is missing",
+        /// Bytes before the chunk, or before the end, are missing.
+        MissingChunk = 7 => "bytes before it are missing",
+        /// The snapshot is longer than the robot's buffer.
+        TooLong = 8 => "the snapshot is longer than the robot's buffer",
+        /// The CRC of the bytes received differs from the announced one.
+        BadCrc = 9 => "the CRC differs from the announced one",
+        /// The snapshot is intact but of another version or other capacities, or its contents are invalid.
+        BadSnapshot = 10 => "the snapshot is of another version or other capacities, or invalid",
+        /// Another operation must finish first.
+        Busy = 11 => "another operation must finish first",
     }
 }
 

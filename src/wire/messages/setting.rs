@@ -1,4 +1,4 @@
-//! What can be set while the robot runs.
+//! The settings that can be changed while the robot runs.
 
 use serde::{Deserialize, Serialize};
 
@@ -30,24 +30,24 @@ pub enum Setting {
     SnapshotEveryPlaces(u16),
 }
 
-/// Everything that can be set while the robot runs, as it is.
+/// The values of all settings that can be changed while the robot runs.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Settings {
     /// The filter's settings.
     pub filter: RobustConfig,
     /// The place detector's settings.
     pub place: PlaceConfig,
-    /// How fast to drive, in thousandths of the drive's full speed, 1 to 1000.
+    /// The speed in thousandths of the drive's full speed, 1 to 1000.
     pub speed_permille: u16,
-    /// After how many places a snapshot is kept that outlasts a loss of power; 0: only when told.
+    /// A snapshot is stored every this many places; 0 for never.
     pub snapshot_every_places: u16,
 }
 
 impl Settings {
-    /// The settings with one changed, for a robot with room for so many hypotheses and with so many sonars.
+    /// The settings with one of them changed, for a robot of these capacities.
     ///
     /// # Errors
-    /// [`Refusal::OutOfRange`] when the stage that it belongs to would not start with it.
+    /// [`Refusal::OutOfRange`] if the value is out of its range.
     pub fn with(mut self, setting: Setting, hypotheses: usize, sonars: usize) -> Result<Self, Refusal> {
         let byte = |value: u16| u8::try_from(value).map_err(|_| Refusal::OutOfRange);
         match setting {

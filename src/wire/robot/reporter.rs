@@ -1,18 +1,17 @@
-//! Successive states to messages: what has changed at once, and everything in turn.
+//! Turns the successive states of the mapper into messages: changes at once, and the whole map in turn.
 
 use core::fmt;
 
 use crate::place::Place;
 use crate::wire::digest::{map_digest, row_of};
-use crate::wire::{Belief, Capacities, Evidence, Hello, List, Location, Message, Renamed, ResetCause, Row, Worst};
+use crate::wire::{Belief, Capacities, Evidence, Hello, List, Location, Message, Remapped, ResetCause, Row, Worst};
 use crate::{FaultCounters, FaultKind, Filter, Map, Mapper, Update};
 
-/// Decides what to send. It keeps what the listener was last told and hands each message to a callback, which says
-/// whether the transmit queue took it; it never waits.
+/// Decides which messages to send. It remembers what was sent, and passes each message to a callback, which says whether
+/// the transmit queue took it. It never waits.
 ///
-/// A message that was refused counts as not sent: the change goes out with the next update or with the rolling
-/// picture, whichever comes first. Messages that are no state (`Place`, `Health`, `Ring`) the caller sends on its own.
-/// Memory: 16 bytes for each vertex and about 150 bytes.
+/// A change whose message was refused is sent again with the next update or with the repeated map, whichever comes first. The
+/// caller sends `Health`, `Ring`, `Velocity` and `Reply` itself. Memory: 16 bytes per vertex and about 150 bytes.
 #[derive(Clone, Debug)]
 pub struct Reporter<const V: usize> {
     hello: Hello,
@@ -21,15 +20,15 @@ pub struct Reporter<const V: usize> {
     vertices: u8,
     labels: [(u16, u32); V],
     neighbours: [u64; V],
-    /// How many vertices the filter's map had after the last place.
+    /// The number of vertices of the filter's map after the last place.
     vertices_before: u8,
     location: Option<Location>,
     belief: Option<Belief>,
     faults: [u32; FaultKind::ALL.len()],
-    /// Whose turn it is in the rolling picture: a vertex, or one of the turns that follow the last vertex.
+    /// The next piece of the repeated map: a vertex, or one of the pieces after the last vertex.
     turn: u8,
     fault_turn: u8,
-    /// Whether the rest of the round goes out fast.
+    /// Whether the present round is sent at the fast pace.
     sends_full: bool,
     refused: u32,
 }
@@ -38,7 +37,7 @@ impl<const V: usize> Reporter<V> {
     /// How many pieces of the map a tick sends after [`Reporter::send_full`].
     const PIECES_PER_FULL_TICK: u8 = 4;
 
-    /// A reporter that has to be started.
+    /// A reporter that has to be started with [`Reporter::start`].
     pub const fn new() -> Self {
         let capacities =
             Capacities { vertices: 0, hypotheses: 0, history: 0, ngram_length: 0, fingerprint_step_mm: 0, sonars: 0 };
@@ -67,9 +66,7 @@ impl<const V: usize> Reporter<V> {
         }
     }
 
-    /// Begins anew: nothing was told yet, and the next tick introduces the robot.
-    ///
-    /// The introduction is repeated with every `ticks_per_hello` ticks after that; 0 means with every tick.
+    /// Starts with nothing sent. The next tick sends the `Hello`, and then every `ticks_per_hello`th; 0 means every tick.
     pub fn start(&mut self, hello: Hello, ticks_per_hello: u16) {
         self.hello = hello;
         self.ticks_per_hello = ticks_per_hello;
@@ -102,10 +99,10 @@ impl<const V: usize> Reporter<V> {
             return;
         }
         let place_index = self.location.map_or(0, |location| location.place_index);
-        let names = List::new((0..vertices).map(|_| Renamed::GONE));
-        let renamed = Renamed { place_index, names };
-        if self.send(&Message::Renamed(renamed), &mut send) {
-            self.tell_renamed(&renamed);
+        let removed = List::new((0..vertices).map(|_| Remapped::REMOVED));
+        let remapped = Remapped { place_index, vertices: removed };
+        if self.send(&Message::Remapped(remapped), &mut send) {
+            self.note_remapped(&remapped);
         }
         self.vertices_before = 0;
         self.location = None;
@@ -151,11 +148,11 @@ impl<const V: usize> Reporter<V> {
         self.refused
     }
 
-    /// After each place: sends what became of the vertices, what is new in the filter's best map, how large it is, where
-    /// the robot is and may be, and why.
+    /// Sends the update of one place: changed vertex ids, changed vertices and edges, the size of the map, location, belief,
+    /// evidence and worst n-gram.
     ///
-    /// A vertex of which several edges changed goes out as one `Row`, so that a change of the best hypothesis cannot
-    /// flood the line: at most 2 `V` + 6 messages. Cost: linear in the number of vertices and edges.
+    /// A vertex with several changed edges is sent as one `Row`, so that a change of the best hypothesis does not flood the
+    /// line: at most 2 `V` + 6 messages. Cost: linear in the number of vertices and edges.
     pub fn update(
         &mut self,
         filter: &impl Filter<V>,
@@ -163,45 +160,45 @@ impl<const V: usize> Reporter<V> {
         mut send: impl FnMut(&Message) -> Result<(), QueueFull>,
     ) {
         let map = filter.map();
-        let renamed = Renamed::of(filter, self.vertices_before, update.place_index);
+        let remapped = Remapped::of(filter, self.vertices_before, update.place_index);
         self.vertices_before = map.vertices().len() as u8;
         let mut changed = false;
-        // A listener that does not hear of it keeps the old numbers, and so does what it was told; the messages that
-        // follow state what differs.
-        if let Some(renamed) = renamed
-            && self.send(&Message::Renamed(renamed), &mut send)
+        // If the queue refuses it, the listener keeps the old ids, and so does the record of what was sent; the messages
+        // below send the difference.
+        if let Some(remapped) = remapped
+            && self.send(&Message::Remapped(remapped), &mut send)
         {
             changed = true;
-            self.tell_renamed(&renamed);
+            self.note_remapped(&remapped);
         }
-        let told_vertices = self.vertices;
+        let sent_vertices = self.vertices;
         let vertices = map.vertices().len() as u8;
-        if vertices < told_vertices {
+        if vertices < sent_vertices {
             self.forget_from(vertices);
         }
-        changed |= vertices != told_vertices;
+        changed |= vertices != sent_vertices;
         for vertex in map.vertices() {
             let row = row_of(map, vertex);
             if self.flips(&row).count_ones() > 1 {
                 changed = true;
                 self.send_row(row, &mut send);
-            } else if self.label_told(row.vertex) != Some((row.radius_mm, row.visits)) {
+            } else if self.sent_label(row.vertex) != Some((row.radius_mm, row.visits)) {
                 changed = true;
                 let Row { vertex, radius_mm, visits, .. } = row;
                 if self.send(&Message::Vertex { vertex, radius_mm, visits }, &mut send) {
-                    self.tell_label(&row);
+                    self.note_label(&row);
                 }
             }
         }
         for row in map.vertices().map(|vertex| row_of(map, vertex)) {
             let flips = self.flips(&row);
             changed |= flips != 0;
-            // More than one is a row that the queue refused: the rolling picture has it.
+            // More than one: the queue refused the row, and the repeated map will send it.
             if flips.count_ones() == 1 {
                 let (a, b) = (row.vertex, flips.trailing_zeros() as u8);
                 let present = row.neighbours & flips != 0;
                 if self.send(&Message::Edge { a, b, present }, &mut send) {
-                    self.tell_edge(a, b, present);
+                    self.note_edge(a, b, present);
                 }
             }
         }
@@ -220,11 +217,11 @@ impl<const V: usize> Reporter<V> {
         self.send(&Message::Worst(Worst::of(filter, update.place_index)), &mut send);
     }
 
-    /// At a steady pace: sends the faults whose count has changed and the next piece of the rolling picture.
+    /// Sends the changed fault counts and the next piece of the repeated map. Call it at a steady pace.
     ///
-    /// The pieces are every vertex of the map, the size of the map, the location, the belief, and one fault that was ever
-    /// seen. A listener that hears the `vertices + 4` ticks of one round without a loss has converged. At most one message for
-    /// each kind of fault, a `Hello` and a piece, or four pieces in a hurry.
+    /// The pieces of a round are each vertex, the size of the map, the location, the belief, and one fault with a count
+    /// above 0. A listener that receives the `vertices + 4` ticks of a round without loss has converged. At most one message
+    /// per kind of fault, a `Hello`, and one piece (four after [`Reporter::send_full`]).
     pub fn tick(
         &mut self,
         map: &Map<V>,
@@ -251,7 +248,7 @@ impl<const V: usize> Reporter<V> {
         }
     }
 
-    /// Sends the next piece of the rolling picture, unless it is one of nothing; tells whether it is the turn of the next.
+    /// Sends the next piece of the repeated map, if there is anything to send; returns whether the queue took it.
     fn send_piece(
         &mut self,
         map: &Map<V>,
@@ -284,9 +281,9 @@ impl<const V: usize> Reporter<V> {
     fn send_row(&mut self, row: Row, send: &mut impl FnMut(&Message) -> Result<(), QueueFull>) -> bool {
         let taken = self.send(&Message::Row(row), send);
         if taken {
-            self.tell_label(&row);
+            self.note_label(&row);
             for vertex in 0..V as u8 {
-                self.tell_edge(row.vertex, vertex, row.neighbours & bit(vertex) != 0);
+                self.note_edge(row.vertex, vertex, row.neighbours & bit(vertex) != 0);
             }
         }
         taken
@@ -308,13 +305,13 @@ impl<const V: usize> Reporter<V> {
         send: &mut impl FnMut(&Message) -> Result<(), QueueFull>,
     ) -> bool {
         let taken = self.send(&Message::Fault { kind: kind as u8, count }, send);
-        if let (true, Some(told)) = (taken, self.faults.get_mut(kind as usize)) {
-            *told = count;
+        if let (true, Some(sent)) = (taken, self.faults.get_mut(kind as usize)) {
+            *sent = count;
         }
         taken
     }
 
-    /// The next kind of fault, in rotation, that was seen at all.
+    /// The next kind of fault with a count above 0, in rotation.
     fn next_fault(&mut self, faults: &FaultCounters) -> Option<FaultKind> {
         let seen = |kind: &FaultKind| faults.count(*kind) > 0;
         let after = FaultKind::ALL.into_iter().filter(seen).find(|&kind| kind as u8 >= self.fault_turn);
@@ -323,33 +320,33 @@ impl<const V: usize> Reporter<V> {
         Some(kind)
     }
 
-    /// The edges to this vertex or a later one in which a row differs from what was told.
+    /// The edges from a vertex to itself or a later one that differ from what was sent.
     fn flips(&self, row: &Row) -> u64 {
-        let told = self.neighbours.get(usize::from(row.vertex)).copied().unwrap_or(0);
-        (row.neighbours ^ told) & !bit(row.vertex).wrapping_sub(1)
+        let sent = self.neighbours.get(usize::from(row.vertex)).copied().unwrap_or(0);
+        (row.neighbours ^ sent) & !bit(row.vertex).wrapping_sub(1)
     }
 
-    fn label_told(&self, vertex: u8) -> Option<(u16, u32)> {
+    fn sent_label(&self, vertex: u8) -> Option<(u16, u32)> {
         if vertex < self.vertices { self.labels.get(usize::from(vertex)).copied() } else { None }
     }
 
-    fn tell_renamed(&mut self, renamed: &Renamed) {
+    fn note_remapped(&mut self, remapped: &Remapped) {
         let labelled = bit(self.vertices).wrapping_sub(1);
-        renamed.apply(&mut self.labels, &mut self.neighbours, labelled);
-        self.vertices = renamed.vertices(self.vertices).min(V as u8);
-        self.location = self.location.and_then(|location| location.renamed(renamed));
+        remapped.apply(&mut self.labels, &mut self.neighbours, labelled);
+        self.vertices = remapped.count(self.vertices).min(V as u8);
+        self.location = self.location.and_then(|location| location.remapped(remapped));
         if let Some(belief) = &mut self.belief {
-            belief.rename(renamed);
+            belief.remap(remapped);
         }
     }
 
-    fn tell_label(&mut self, row: &Row) {
+    fn note_label(&mut self, row: &Row) {
         if let Some(label) = self.labels.get_mut(usize::from(row.vertex)) {
             *label = (row.radius_mm, row.visits);
         }
     }
 
-    fn tell_edge(&mut self, a: u8, b: u8, present: bool) {
+    fn note_edge(&mut self, a: u8, b: u8, present: bool) {
         for (from, to) in [(a, b), (b, a)] {
             if let Some(row) = self.neighbours.get_mut(usize::from(from)) {
                 *row = if present { *row | bit(to) } else { *row & !bit(to) };
@@ -357,7 +354,7 @@ impl<const V: usize> Reporter<V> {
         }
     }
 
-    /// A vertex that goes takes its edges along, here as with the listener.
+    /// Removes the vertices from `vertices` on with their edges, as the listener does.
     fn forget_from(&mut self, vertices: u8) {
         let kept = bit(vertices).wrapping_sub(1);
         for (row, vertex) in self.neighbours.iter_mut().zip(0u8..) {
@@ -373,7 +370,7 @@ impl<const V: usize> Default for Reporter<V> {
     }
 }
 
-/// The bit of a vertex in a row; no bit from 64 on, so that `bit(v).wrapping_sub(1)` is every bit below `v`.
+/// The bit of a vertex in a row, 0 from vertex 64 on, so that `bit(v).wrapping_sub(1)` has every bit below `v`.
 pub(in crate::wire) fn bit(vertex: u8) -> u64 {
     1u64.checked_shl(u32::from(vertex)).unwrap_or(0)
 }

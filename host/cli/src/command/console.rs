@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use anyhow::Context;
 use clap::{Args, Subcommand, ValueEnum};
-use toposlam::wire::{Command, Picture};
+use toposlam::wire::{Command, MapReplica};
 use toposlam_link::client::Client;
 use toposlam_link::line::{Line, open};
 use toposlam_link::listener::{Event, Listener};
@@ -118,14 +118,14 @@ fn order(client: &mut Client<Box<dyn Line>, impl FnMut(&Listener, Event<'_>)>, c
     Ok(())
 }
 
-pub(super) fn print_map(picture: &Picture<64>) {
-    println!("map: {} vertices, {} edges", picture.vertices(), picture.edges().count());
-    for row in (0..picture.vertices()).filter_map(|vertex| picture.row(vertex)) {
+pub(super) fn print_map(replica: &MapReplica<64>) {
+    println!("map: {} vertices, {} edges", replica.vertices(), replica.edges().count());
+    for row in (0..replica.vertices()).filter_map(|vertex| replica.row(vertex)) {
         println!("  vertex {:2}: radius {:4} mm, {} visits", row.vertex, row.radius_mm, row.visits);
     }
-    let edges: Vec<String> = picture.edges().map(|(a, b)| format!("{a}-{b}")).collect();
+    let edges: Vec<String> = replica.edges().map(|(a, b)| format!("{a}-{b}")).collect();
     println!("  edges: {}", edges.join(" "));
-    if let Some(location) = picture.location() {
+    if let Some(location) = replica.location() {
         println!("  at vertex {}", location.vertex);
     }
 }

@@ -108,7 +108,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
             heard.feed(bytes, |message| {
                 let Ok(repetition) = repetition.lock() else { return ControlFlow::Break(()) };
                 let is_same = match message {
-                    Message::Drive(drive) => {
+                    Message::Velocity(drive) => {
                         let speed_permille = drive.speed_permille.unsigned_abs();
                         let velocity = VelocityCommand { heading_mrad: drive.heading_mrad, speed_permille };
                         // The world may have ended meanwhile.
@@ -140,7 +140,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     };
     arguments.drive.summarise(&Summary::of(&plan, &exploration))?;
     let counters = heard.decoder.counters();
-    let Some(health) = heard.picture.health() else { bail!("the firmware never said how it is doing") };
+    let Some(health) = heard.replica.health() else { bail!("the firmware never said how it is doing") };
     println!("firmware: {} places in {} frames, {:.1} s", heard.places.len(), outcome.frames, outcome.seconds);
     println!("wire: {} messages, {} frames lost, {} corrupt", counters.messages, counters.lost, counters.corrupt);
     println!("sensor bus: {} bytes, {} rounds of the loop", outcome.bus_bytes, health.loop_count);
@@ -158,27 +158,27 @@ fn compare(exploration: &Exploration<'_>, heard: &Heard) -> anyhow::Result<()> {
     let map = mapper.map();
     let places = steps.iter().map(|step| (step.update.place_index, step.place.fingerprint.radius_mm()));
     ensure!(places.eq(heard.places.iter().copied()), "the firmware detected other places than this computer");
-    ensure!(heard.picture.is_converged(), "the map heard over the wire is not complete");
+    ensure!(heard.replica.is_converged(), "the map heard over the wire is not complete");
     let same_rows = map.vertices().all(|vertex| {
-        heard.picture.row(vertex.into()).is_some_and(|row| {
+        heard.replica.row(vertex.into()).is_some_and(|row| {
             map.label(vertex).map(|label| label.radius_mm()) == Some(row.radius_mm)
                 && map.visits(vertex) == row.visits
                 && map.neighbours(vertex).bits() == row.neighbours
         })
     });
-    let same_size = usize::from(heard.picture.vertices()) == map.vertices().len();
+    let same_size = usize::from(heard.replica.vertices()) == map.vertices().len();
     ensure!(same_rows && same_size, "the firmware's map is another one");
     if let Some(step) = steps.last() {
         let (filter, place_index) = (mapper.filter(), step.update.place_index);
         ensure!(
-            heard.picture.location() == Some(Location::from(&step.update)),
+            heard.replica.location() == Some(Location::from(&step.update)),
             "the firmware believes to be elsewhere"
         );
-        ensure!(heard.picture.evidence() == Some(Evidence::from(&step.update)), "the firmware gives other evidence");
+        ensure!(heard.replica.evidence() == Some(Evidence::from(&step.update)), "the firmware gives other evidence");
         let belief = Some(Belief::of(filter, place_index));
-        ensure!(heard.picture.belief() == belief, "the firmware gives other probabilities");
+        ensure!(heard.replica.belief() == belief, "the firmware gives other probabilities");
         let worst = Some(Worst::of(filter, place_index));
-        ensure!(heard.picture.worst() == worst, "the firmware names another worst n-gram");
+        ensure!(heard.replica.worst() == worst, "the firmware names another worst n-gram");
     }
     Ok(())
 }

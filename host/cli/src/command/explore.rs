@@ -14,7 +14,7 @@ use toposlam_sim::world::{Plan, Report, RobotModel};
 
 use super::drive::{fault_rate, load_plan, noise_factor};
 
-/// A journey that takes more ring frames is given up.
+/// A goal_status that takes more ring frames is given up.
 const FRAMES_PER_JOURNEY: u64 = 20_000;
 
 /// Arguments of `toposlam explore`.

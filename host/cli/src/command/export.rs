@@ -57,7 +57,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     let mut layout = Layout::new();
     layout.arrange(&map);
     let points = layout.points();
-    let here = listener.picture().location().map(|location| location.vertex);
+    let here = listener.replica().location().map(|location| location.vertex);
     let text = match arguments.format {
         Format::Graphml => export::graphml(&map, points, here),
         Format::Dot => export::dot(&map, points, here),
@@ -117,7 +117,7 @@ fn replayed(path: &Path) -> Result<Listener, LogError> {
 }
 
 fn complain_of_gaps(listener: &Listener) {
-    if !listener.picture().is_complete() || !listener.picture().is_converged() {
+    if !listener.replica().is_complete() || !listener.replica().is_converged() {
         eprintln!("the map was not heard whole: vertices or edges may be missing");
     }
 }

@@ -103,7 +103,7 @@ pub(super) fn run(
                         trial.exploration.note(&Place { fingerprint, frame_index, degree, spread_mm: 0 });
                         bar.inc(1);
                     }
-                    Message::Drive(drive) => {
+                    Message::Velocity(drive) => {
                         turns = drive.frame_index.wrapping_add(1);
                         let speed_permille = drive.speed_permille.unsigned_abs();
                         // The world may have ended meanwhile.
@@ -136,8 +136,8 @@ pub(super) fn run(
     ensure!(observed as usize == exploration.places(), "the firmware has {observed} places and told other ones");
     let faults = FaultCounters::new();
     arguments.summarise(&Summary { faults, ..Summary::of(&plan, &exploration) })?;
-    for kind in FaultKind::ALL.into_iter().filter(|kind| heard.picture.fault(*kind) > 0) {
-        println!("firmware's fault {kind:?}: {}", heard.picture.fault(kind));
+    for kind in FaultKind::ALL.into_iter().filter(|kind| heard.replica.fault(*kind) > 0) {
+        println!("firmware's fault {kind:?}: {}", heard.replica.fault(kind));
     }
     println!("sensor bus: {}", outcome.bridge);
     println!("line to the firmware: {}", line.counts());

@@ -2,18 +2,18 @@
 
 use std::ops::ControlFlow;
 
-use toposlam::wire::{Decoder, Message, Picture, Progress};
+use toposlam::wire::{Decoder, MapReplica, Message, Progress};
 
 /// What the firmware said.
 pub(super) struct Heard {
     pub(super) decoder: Decoder,
-    pub(super) picture: Picture<64>,
+    pub(super) replica: MapReplica<64>,
     pub(super) places: Vec<(u32, u16)>,
 }
 
 impl Heard {
     pub(super) const fn new() -> Self {
-        Self { decoder: Decoder::new(), picture: Picture::new(), places: Vec::new() }
+        Self { decoder: Decoder::new(), replica: MapReplica::new(), places: Vec::new() }
     }
 
     /// Takes bytes of the line, and hands on every message.
@@ -28,7 +28,7 @@ impl Heard {
                 Progress::NeedsMore => return ControlFlow::Continue(()),
                 Progress::Error { rest, .. } => rest,
                 Progress::Message { header, message, rest } => {
-                    self.picture.apply(header, &message);
+                    self.replica.apply(header, &message);
                     if let Message::Place { place_index, radius_mm, .. } = message {
                         self.places.push((place_index, radius_mm));
                     }

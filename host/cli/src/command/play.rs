@@ -138,6 +138,6 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     let unknown = counters.unknown_version + counters.unknown_message;
     println!("{} messages, {} frames lost, {damaged} damaged, {unknown} unknown", counters.messages, counters.lost);
     println!("{}", listener.understanding());
-    print_map(listener.picture());
+    print_map(listener.replica());
     Ok(())
 }

@@ -189,7 +189,7 @@ impl Fleet {
         &self.robots
     }
 
-    /// All robots in numbers. Cost: [`toposlam::wire::Picture::is_converged`] for each.
+    /// All robots in numbers. Cost: [`toposlam::wire::MapReplica::is_converged`] for each.
     pub fn totals(&self) -> Totals {
         let mut totals = Totals::default();
         for robot in &self.robots {
@@ -250,7 +250,7 @@ impl Robot {
 
     /// Whether its map is known to be heard whole. A robot of which nothing was heard has no map to be whole.
     pub fn is_converged(&self) -> bool {
-        self.listener.picture().is_converged()
+        self.listener.replica().is_converged()
     }
 
     /// How many bytes it sent.

@@ -123,14 +123,14 @@ impl Model {
             Arrival::First | Arrival::InOrder | Arrival::AfterGap { .. } => {}
         }
         match message {
-            Message::Renamed(_) | Message::Journey(_) => self.note(wording::message(message)),
+            Message::Remapped(_) | Message::GoalStatus(_) => self.note(wording::message(message)),
             Message::Fault { kind, count } if self.is_news(*kind, *count) => self.complain(wording::message(message)),
             _ => {}
         }
     }
 
     fn is_news(&self, kind: u8, count: u32) -> bool {
-        FaultKind::ALL.get(usize::from(kind)).is_none_or(|&kind| self.watch.listener().picture().fault(kind) != count)
+        FaultKind::ALL.get(usize::from(kind)).is_none_or(|&kind| self.watch.listener().replica().fault(kind) != count)
     }
 
     fn answered(&mut self, task: &Task, answer: &Result<Answer, TaskError>) {

@@ -8,8 +8,8 @@ use ratatui::crossterm::event::{KeyCode, KeyEvent, KeyModifiers};
 use toposlam::reference::SNAPSHOT_BYTES;
 use toposlam::ring::Echo;
 use toposlam::wire::{
-    Capacities, Command, Echoes, Encoder, Hello, Journey, JourneyState, MAX_FRAME_BYTES, Message, Outcome,
-    PROTOCOL_VERSION, Refusal, Renamed, ResetCause,
+    Capacities, Command, Echoes, Encoder, GoalState, GoalStatus, Hello, MAX_FRAME_BYTES, Message, Outcome,
+    PROTOCOL_VERSION, Refusal, Remapped, ResetCause,
 };
 
 use super::model::{Action, Model};
@@ -89,7 +89,7 @@ fn hello() -> Hello {
 fn a_wide_screen_shows_all_that_a_robot_says() {
     let (mut watch, edges, radii) = office(40);
     let screen = watch.screen(140, 45);
-    let picture = watch.listener.picture().clone();
+    let picture = watch.listener.replica().clone();
     for radius in &radii {
         assert!(screen.matches(&radius.to_string()).count() >= 2, "{radius} mm is in the map and the table\n{screen}");
     }
@@ -298,9 +298,9 @@ fn journeys_and_new_numbers_are_told() {
     let mut watch = Watch::new("tcp:robot:7070");
     watch.hear(&Message::Vertex { vertex: 0, radius_mm: 700, visits: 1 });
     watch.hear(&Message::Vertex { vertex: 1, radius_mm: 900, visits: 1 });
-    watch.hear(&Message::Journey(Journey { vertex: 1, state: JourneyState::Underway }));
+    watch.hear(&Message::GoalStatus(GoalStatus { vertex: 1, state: GoalState::Active }));
     assert!(watch.screen(120, 40).contains("way to vertex 1: under way"));
-    watch.hear(&Message::Renamed(Renamed { place_index: 2, names: toposlam::wire::List::new([1, 0]) }));
+    watch.hear(&Message::Remapped(Remapped { place_index: 2, vertices: toposlam::wire::List::new([1, 0]) }));
     let screen = watch.screen(120, 40);
     assert!(screen.contains("0 is 1, 1 is 0") && screen.contains("way to vertex 0: under way"), "{screen}");
 }

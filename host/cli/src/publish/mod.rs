@@ -151,7 +151,7 @@ impl Publisher {
             News::Disconnected(_) | News::Ended => retained.set_status(OFFLINE),
             News::Heard(event, listener) => {
                 let event = Event::from(event);
-                if changes_map(event) && listener.picture().is_converged() {
+                if changes_map(event) && listener.replica().is_converged() {
                     retained.set_map(map_json(listener).to_string());
                 }
                 self.shared.offer(&self.client, &self.shared.topics.events, json::event(event).to_string());
@@ -285,7 +285,7 @@ fn changes_map(event: Event<'_>) -> bool {
                 | Message::Edge { .. }
                 | Message::Row(_)
                 | Message::Location(_)
-                | Message::Renamed(_)
+                | Message::Remapped(_)
         )
     )
 }
@@ -299,7 +299,7 @@ pub fn map_json(listener: &Listener) -> Value {
         .map(|(vertex, label)| json!({"vertex": vertex, "radius_mm": label.radius_mm, "visits": label.visits}))
         .collect();
     let location = listener
-        .picture()
+        .replica()
         .location()
         .map(|location| json!({"vertex": location.vertex, "place_index": location.place_index}));
     json!({"vertices": vertices, "edges": map.edges, "location": location, "digest": map.digest()})

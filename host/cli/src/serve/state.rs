@@ -21,7 +21,7 @@ use toposlam_link::{json, wording};
 /// Both parts.
 #[derive(Clone, Debug, PartialEq)]
 pub struct State {
-    /// The line and whether it is open, the map where the layout draws it, where the robot may be, why it believes so, its journey, and
+    /// The line and whether it is open, the map where the layout draws it, where the robot may be, why it believes so, the status of its goal, and
     /// its faults.
     ///
     /// Distances are in millimetres, `null` when they are infinite; `x` and `y` count edges, `y` points up. What was not heard is `null`.
@@ -42,7 +42,7 @@ impl State {
 
 fn map(watch: &Watch) -> Value {
     let listener = watch.listener();
-    let picture = listener.picture();
+    let replica = listener.replica();
     let map = watch.map();
     let vertices: Vec<Value> = (0..)
         .zip(map.vertices.iter().zip(watch.points()))
@@ -56,31 +56,31 @@ fn map(watch: &Watch) -> Value {
             })
         })
         .collect();
-    let evidence = picture.evidence();
+    let evidence = replica.evidence();
     json!({
         "line": watch.line(),
         "connection": connection(watch.connection()),
         "understanding": understanding(listener),
-        "hello": picture.hello(),
+        "hello": replica.hello(),
         "vertices": vertices,
         "edges": map.edges,
-        "converged": picture.is_converged(),
-        "location": picture.location(),
-        "belief": picture.belief(),
+        "converged": replica.is_converged(),
+        "location": replica.location(),
+        "belief": replica.belief(),
         "evidence": evidence.map(|evidence| json!({
             "place_index": evidence.place_index,
             "consistency_mm": finite_mm(evidence.consistency_mm),
             "lead_nats": thousandths(wording::nats(evidence.lead_q16)),
             "distinct_hypotheses": evidence.distinct_hypotheses,
         })),
-        "worst": picture.worst().map(|worst| json!({
+        "worst": replica.worst().map(|worst| json!({
             "distance_mm": finite_mm(worst.distance_mm),
             "newest_age": worst.newest_age,
             "vertices": worst.vertices,
         })),
-        "journey": picture.journey().map(|journey| json!({
-            "vertex": journey.vertex,
-            "state": journey.state.to_string(),
+        "goal_status": replica.goal_status().map(|goal_status| json!({
+            "vertex": goal_status.vertex,
+            "state": goal_status.state.to_string(),
         })),
         "faults": faults(listener),
     })
@@ -93,7 +93,7 @@ fn live(listener: &Listener) -> Value {
             "frame_index": frame_index,
             "ranges_mm": json::ranges_mm(&echoes),
         })),
-        "drive": listener.drive().map(|drive| json!({
+        "drive": listener.velocity().map(|drive| json!({
             "frame_index": drive.frame_index,
             "heading_mrad": drive.heading_mrad,
             "speed_permille": drive.speed_permille,
@@ -129,7 +129,7 @@ fn understanding(listener: &Listener) -> Value {
 }
 
 fn faults(listener: &Listener) -> Vec<Value> {
-    let counts = FaultKind::ALL.iter().map(|&kind| (kind, listener.picture().fault(kind)));
+    let counts = FaultKind::ALL.iter().map(|&kind| (kind, listener.replica().fault(kind)));
     counts
         .filter(|&(_, count)| count > 0)
         .map(|(kind, count)| json!({"kind": format!("{kind:?}"), "count": count}))

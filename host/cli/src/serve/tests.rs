@@ -11,7 +11,7 @@ use serde_json::{Value, json};
 use toposlam::reference::SNAPSHOT_BYTES;
 use toposlam::ring::Echo;
 use toposlam::wire::{
-    Capacities, Command, Echoes, Encoder, Hello, List, MAX_FRAME_BYTES, Message, PROTOCOL_VERSION, Renamed, ResetCause,
+    Capacities, Command, Echoes, Encoder, Hello, List, MAX_FRAME_BYTES, Message, PROTOCOL_VERSION, Remapped, ResetCause,
 };
 
 use super::server::{Options, Server};
@@ -319,7 +319,7 @@ fn a_vertex_keeps_its_position_under_its_new_number() {
     let mut before = Watch::new("line");
     hear(&mut before, &path);
     let mut after = Watch::new("line");
-    let reversed = Message::Renamed(Renamed { place_index: 4, names: List::new([3, 2, 1, 0]) });
+    let reversed = Message::Remapped(Remapped { place_index: 4, vertices: List::new([3, 2, 1, 0]) });
     hear(&mut after, &[path.as_slice(), &[reversed]].concat());
     let mut expected = positions(&mut before);
     expected.reverse();

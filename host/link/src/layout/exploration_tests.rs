@@ -60,7 +60,7 @@ fn the_picture_of_an_exploration_mostly_stands_still() {
         while exploration.places() < PLACES {
             exploration.advance();
             listener.feed(&exploration.board().sent, |listener, event| match event {
-                Event::Message(header, message @ Message::Renamed(_)) => layout.hear(header, message),
+                Event::Message(header, message @ Message::Remapped(_)) => layout.hear(header, message),
                 // With this all of an update is heard.
                 Event::Message(_, Message::Map { .. }) => tally.arrange(&mut layout, listener),
                 Event::Message(..) | Event::Damaged(_) => {}

@@ -28,7 +28,7 @@ mod smoothing;
 mod triangulation;
 mod untangling;
 
-use toposlam::wire::{Arrival, Header, Message, Renamed};
+use toposlam::wire::{Arrival, Header, Message, Remapped};
 
 use self::graph::Graph;
 use crate::topology::TopologicalMap;
@@ -97,7 +97,7 @@ impl Layout {
             Arrival::Restart => *self = Self::new(),
             Arrival::First | Arrival::InOrder | Arrival::AfterGap { .. } => {}
         }
-        if let Message::Renamed(renamed) = message {
+        if let Message::Remapped(renamed) = message {
             self.rename(renamed);
         }
     }
@@ -106,7 +106,7 @@ impl Layout {
     ///
     /// Of vertices that are one now, the first one's position stays. [`Layout::arrange`] is to follow: until then a vertex without
     /// a position is at NaN.
-    pub fn rename(&mut self, renamed: &Renamed) {
+    pub fn rename(&mut self, renamed: &Remapped) {
         let mut points = Vec::new();
         for (before, &point) in (0..=u8::MAX).zip(&self.points) {
             let Some(now) = renamed.now(before).map(usize::from) else { continue };

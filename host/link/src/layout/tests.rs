@@ -5,7 +5,7 @@ use std::time::{Duration, Instant};
 
 use rand::{RngExt, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
-use toposlam::wire::{List, Renamed};
+use toposlam::wire::{List, Remapped};
 
 use super::{Layout, Point, conflicts, graph::Graph};
 use crate::topology::{TopologicalMap, Vertex};
@@ -180,7 +180,7 @@ fn a_vertex_with_another_number_keeps_its_position() {
     layout.arrange(&map(5, [(0, 1), (1, 2), (2, 3), (3, 4)]));
     let points = layout.points().to_vec();
     // 1 is gone, 3 and 4 are one.
-    layout.rename(&Renamed { place_index: 7, names: List::new([2, u8::MAX, 0, 1, 1]) });
+    layout.rename(&Remapped { place_index: 7, vertices: List::new([2, u8::MAX, 0, 1, 1]) });
     layout.arrange(&map(4, [(0, 1), (0, 2), (2, 3)]));
     assert_eq!(layout.points()[..3], [points[2], points[3], points[0]]);
     assert!(is_sound(&map(4, [(0, 1), (0, 2), (2, 3)]), layout.points()));
@@ -202,7 +202,7 @@ fn merges_at_random_leave_no_conflicts() {
             let names = (0..=last).map(|vertex| name(if vertex == gone { parent } else { vertex }));
             let edges = map.edges.iter().filter(|&&(a, b)| a != gone && b != gone);
             let edges: Vec<_> = edges.map(|&(a, b)| (name(a), name(b))).collect();
-            layout.rename(&Renamed { place_index: 0, names: List::new(names) });
+            layout.rename(&Remapped { place_index: 0, vertices: List::new(names) });
             map = self::map(last, edges);
             layout.arrange(&map);
             assert!(is_sound(&map, layout.points()), "{map:?}");

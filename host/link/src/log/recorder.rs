@@ -197,7 +197,7 @@ impl<FILE: Write> Notes<FILE> {
 
     fn redraw(&mut self, listener: &Listener, time_ns: u64) -> Result<(), LogError> {
         let map = listener.map();
-        let robot = listener.picture().location().map(|location| location.vertex);
+        let robot = listener.replica().location().map(|location| location.vertex);
         if self.drawn.as_ref().is_some_and(|drawn| drawn.map == map && drawn.robot == robot) {
             return Ok(());
         }

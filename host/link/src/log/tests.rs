@@ -32,7 +32,7 @@ fn drive() -> Drive {
     let mut exploration = Exploration::start(&plan, RobotModel::default(), 1, &mut buffer).unwrap();
     let mut listener = Listener::new();
     let mut turns = Vec::new();
-    while exploration.places() < 6 || !listener.picture().is_converged() {
+    while exploration.places() < 6 || !listener.replica().is_converged() {
         exploration.advance();
         turns.push(exploration.board().sent.clone());
         listener.feed(turns.last().unwrap(), |_, _| ());
@@ -56,7 +56,7 @@ fn heard<'bytes>(pieces: impl Iterator<Item = &'bytes [u8]>) -> Vec<String> {
     let mut listener = Listener::new();
     let mut states = Vec::new();
     for piece in pieces {
-        listener.feed(piece, |listener, event| states.push(format!("{event:?} {:?}", listener.picture())));
+        listener.feed(piece, |listener, event| states.push(format!("{event:?} {:?}", listener.replica())));
     }
     states
 }

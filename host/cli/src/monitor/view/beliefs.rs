@@ -6,41 +6,36 @@ use ratatui::text::{Line, Span};
 
 use super::{FAINT, HERE, boxed};
 use crate::monitor::model::Model;
-use toposlam_link::wording::{distance, nats};
+use toposlam_link::wording::{distance, factors, nats};
 
 pub(super) fn draw(frame: &mut Frame<'_>, area: Rect, model: &Model) {
     let listener = model.watch().listener();
-    let picture = listener.picture();
+    let replica = listener.replica();
     let mut lines = Vec::new();
-    if let Some(location) = picture.location() {
+    if let Some(location) = replica.location() {
         lines.push(Line::from(vec![
             Span::from("at "),
             Span::styled(format!("vertex {}", location.vertex), HERE),
             Span::from(format!(" with place {}", location.place_index)),
         ]));
     }
-    if let Some(belief) = picture.belief() {
-        let places: Vec<String> =
-            belief.places.as_slice().iter().map(|place| format!("{} {}‰", place.vertex, place.permille)).collect();
-        lines.push(Line::from(format!("probably at {}", places.join(", "))));
+    if let Some(belief) = replica.belief() {
+        let vertices: Vec<String> =
+            belief.vertices.as_slice().iter().map(|at| format!("{} {}‰", at.vertex, at.permille)).collect();
+        lines.push(Line::from(format!("probably at {}", vertices.join(", "))));
         let rivals = 1000_u16.saturating_sub(belief.map_permille);
         lines.push(Line::from(format!("this map {}‰, its rivals {rivals}‰", belief.map_permille)));
     }
-    if let Some(evidence) = picture.evidence() {
+    if let Some(evidence) = replica.evidence() {
         lines.push(Line::from(format!("consistency {}", distance(evidence.consistency_mm))));
-        lines.push(Line::from(format!(
-            "ln: label {:.2}, consistency {:.2}, size {:.2}",
-            nats(evidence.ln_label_q16),
-            nats(evidence.ln_consistency_q16),
-            nats(evidence.ln_size_q16)
-        )));
+        lines.push(Line::from(format!("ln: {}", factors(&evidence.factors))));
         lines.push(Line::from(format!(
             "lead {:.2} nats, {} hypotheses",
             nats(evidence.lead_q16),
             evidence.distinct_hypotheses
         )));
     }
-    if let Some(worst) = picture.worst() {
+    if let Some(worst) = replica.worst() {
         let walk: Vec<String> = worst.vertices.as_slice().iter().map(u8::to_string).collect();
         let age = worst.newest_age;
         lines.push(Line::from(format!("worst {}: {}, {age} ago", distance(worst.distance_mm), walk.join("-"))));

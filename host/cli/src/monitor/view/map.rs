@@ -70,7 +70,7 @@ fn label(model: &Model, number: usize, radius_mm: u16) -> TextLine<'static> {
 }
 
 fn color_of(model: &Model, number: usize) -> Color {
-    let target = model.watch().listener().picture().journey().map(|journey| usize::from(journey.vertex));
+    let target = model.watch().listener().replica().goal_status().map(|goal_status| usize::from(goal_status.vertex));
     if is_here(model, number) {
         Color::Yellow
     } else if permille_at(model, number).is_some() {
@@ -83,12 +83,12 @@ fn color_of(model: &Model, number: usize) -> Color {
 }
 
 fn is_here(model: &Model, number: usize) -> bool {
-    model.watch().listener().picture().location().is_some_and(|location| usize::from(location.vertex) == number)
+    model.watch().listener().replica().location().is_some_and(|location| usize::from(location.vertex) == number)
 }
 
 /// Whether the walk that explains the worst n-gram goes along this edge.
 fn is_worst(model: &Model, a: u8, b: u8) -> bool {
-    let Some(worst) = model.watch().listener().picture().worst() else { return false };
+    let Some(worst) = model.watch().listener().replica().worst() else { return false };
     worst.vertices.as_slice().windows(2).any(|step| *step == [a, b] || *step == [b, a])
 }
 

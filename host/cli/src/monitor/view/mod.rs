@@ -98,7 +98,7 @@ fn heading(model: &Model) -> Line<'_> {
         Connection::Cut(_) => Span::styled("no line", BAD),
         Connection::Ended => Span::styled("ended", FAINT),
     };
-    let picture = model.watch().listener().picture();
+    let picture = model.watch().listener().replica();
     let map = model.watch().map();
     let whole = match (picture.vertices(), picture.is_converged()) {
         (0, _) => Span::styled("no map yet", FAINT),

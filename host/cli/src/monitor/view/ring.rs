@@ -43,7 +43,7 @@ pub(super) fn draw(frame: &mut Frame<'_>, area: Rect, model: &Model) {
 
 fn paint(context: &mut Context<'_>, model: &Model, echoes: &[Echo], range_mm: f64) {
     context.draw(&Circle { x: 0.0, y: 0.0, radius: range_mm, color: Color::DarkGray });
-    if let Some(drive) = model.watch().listener().drive() {
+    if let Some(drive) = model.watch().listener().velocity() {
         let (x, y) =
             towards(f64::from(drive.heading_mrad) / 1000.0, range_mm * f64::from(drive.speed_permille) / 1000.0);
         context.draw(&Line::new(0.0, 0.0, x, y, Color::Green));
@@ -77,7 +77,7 @@ fn paint(context: &mut Context<'_>, model: &Model, echoes: &[Echo], range_mm: f6
 
 /// How many sonars the ring has, as far as anyone has said.
 fn sonars(model: &Model, echoes: usize) -> usize {
-    let told = model.watch().listener().picture().hello().map_or(0, |hello| usize::from(hello.capacities.sonars));
+    let told = model.watch().listener().replica().hello().map_or(0, |hello| usize::from(hello.capacities.sonars));
     told.max(echoes).max(1)
 }
 

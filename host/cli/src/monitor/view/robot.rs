@@ -12,15 +12,15 @@ use toposlam_link::wording::{drive_state, seconds};
 
 pub(super) fn draw(frame: &mut Frame<'_>, area: Rect, model: &Model) {
     let listener = model.watch().listener();
-    let picture = listener.picture();
+    let picture = listener.replica();
     let mut lines = Vec::new();
-    if let Some(drive) = listener.drive() {
+    if let Some(drive) = listener.velocity() {
         let heading_deg = (f64::from(drive.heading_mrad) / 1000.0).to_degrees();
         let speed = drive.speed_permille;
         lines.push(Line::from(format!("heading {heading_deg:.0}°, {speed}‰: {}", drive_state(drive.state))));
     }
-    if let Some(journey) = picture.journey() {
-        lines.push(Line::from(format!("way to vertex {}: {}", journey.vertex, journey.state)));
+    if let Some(goal_status) = picture.goal_status() {
+        lines.push(Line::from(format!("way to vertex {}: {}", goal_status.vertex, goal_status.state)));
     }
     lines.extend(told(model));
     lines.push(faults(model));
@@ -31,7 +31,7 @@ pub(super) fn draw(frame: &mut Frame<'_>, area: Rect, model: &Model) {
             seconds(health.uptime_ms),
             health.loop_count,
             health.stack_high_water_bytes,
-            health.worst_update_us / 1000
+            health.worst_turn_us / 1000
         )));
     }
     lines.push(match picture.hello() {
@@ -54,7 +54,7 @@ fn told(model: &Model) -> Option<Line<'static>> {
 }
 
 fn faults(model: &Model) -> Line<'static> {
-    let picture = model.watch().listener().picture();
+    let picture = model.watch().listener().replica();
     let counts = FaultKind::ALL.iter().map(|&kind| (kind, picture.fault(kind))).filter(|&(_, count)| count > 0);
     let named: Vec<String> = counts.map(|(kind, count)| format!("{kind:?} {count}")).collect();
     if named.is_empty() { Line::styled("no faults", GOOD) } else { Line::styled(named.join(", "), BAD) }

@@ -9,7 +9,7 @@ use super::{FAINT, HERE};
 use crate::monitor::model::Model;
 
 pub(super) fn draw(frame: &mut Frame<'_>, area: Rect, model: &Model) {
-    let picture = model.watch().listener().picture();
+    let picture = model.watch().listener().replica();
     let here = picture.location().map(|location| usize::from(location.vertex));
     let neighbours = model.watch().map().neighbours();
     let rows = model.watch().map().vertices.iter().zip(&neighbours).enumerate().skip(model.scroll());
@@ -40,7 +40,7 @@ pub(super) fn draw(frame: &mut Frame<'_>, area: Rect, model: &Model) {
 
 /// The probability that the robot is at a vertex, in thousandths, when it was told.
 pub(super) fn permille_at(model: &Model, number: usize) -> Option<u16> {
-    let belief = model.watch().listener().picture().belief()?;
-    let place = belief.places.as_slice().iter().find(|place| usize::from(place.vertex) == number)?;
+    let belief = model.watch().listener().replica().belief()?;
+    let place = belief.vertices.as_slice().iter().find(|place| usize::from(place.vertex) == number)?;
     Some(place.permille)
 }

@@ -1,24 +1,24 @@
-//! The listener's side: the map as heard.
+//! A replica of the robot's map, built from its messages.
 
 use crate::{FaultKind, VertexSet};
 
 use crate::wire::decoder::{Arrival, Header};
 use crate::wire::digest::rows_digest;
 use crate::wire::robot::bit;
-use crate::wire::{Belief, Evidence, Health, Hello, Journey, Location, Message, Renamed, Row, Worst};
+use crate::wire::{Belief, Evidence, GoalStatus, Health, Hello, Location, Message, Remapped, Row, Worst};
 
-/// The map as heard so far, and whether it is the robot's.
+/// A replica of the robot's map and of the newest of its other messages.
 ///
-/// Any message may be missing, doubled or late: late ones are ignored, and what is missing comes round with the
-/// rolling picture. `V` has to be at least the robot's; 64 always is. Memory: 16 bytes for each vertex and about 280 bytes.
+/// Messages may be lost, repeated or late: late ones are ignored, and the robot repeats its map in turn. `V` must be at
+/// least that of the robot; 64 always suffices. Memory: 16 bytes per vertex and about 280 bytes.
 #[derive(Clone, Debug)]
-pub struct Picture<const V: usize> {
+pub struct MapReplica<const V: usize> {
     vertices: u8,
     labels: [(u16, u32); V],
     neighbours: [u64; V],
-    /// The vertices whose label was heard.
+    /// The vertices with a known label.
     labelled: u64,
-    /// The digest of the robot's map, unless a message was missed since it was heard.
+    /// The digest of the robot's map, unless a message was lost since it was received.
     digest: Option<u32>,
     hello: Option<Hello>,
     location: Option<Location>,
@@ -26,12 +26,12 @@ pub struct Picture<const V: usize> {
     health: Option<Health>,
     belief: Option<Belief>,
     worst: Option<Worst>,
-    journey: Option<Journey>,
+    goal_status: Option<GoalStatus>,
     faults: [u32; FaultKind::ALL.len()],
 }
 
-impl<const V: usize> Picture<V> {
-    /// The picture of a listener who has heard nothing.
+impl<const V: usize> MapReplica<V> {
+    /// An empty replica.
     pub const fn new() -> Self {
         const { assert!(V >= 1 && V <= 64, "a map holds 1 to 64 vertices") };
         Self {
@@ -46,12 +46,12 @@ impl<const V: usize> Picture<V> {
             health: None,
             belief: None,
             worst: None,
-            journey: None,
+            goal_status: None,
             faults: [0; FaultKind::ALL.len()],
         }
     }
 
-    /// Takes in one message. `Place`, `Ring`, `Drive` and `Reply` leave no trace here; a vertex beyond `V` is left out.
+    /// Applies one message. `Place`, `Ring`, `Velocity` and `Reply` change nothing; vertices from `V` on are dropped.
     pub fn apply(&mut self, header: Header, message: &Message) {
         match header.arrival {
             Arrival::Late => return,
@@ -82,54 +82,54 @@ impl<const V: usize> Picture<V> {
                 }
             }
             Message::Belief(belief) => self.belief = Some(belief),
-            Message::Renamed(renamed) => self.rename(&renamed),
+            Message::Remapped(remapped) => self.remap(&remapped),
             Message::Worst(worst) => self.worst = Some(worst),
-            Message::Journey(journey) => self.journey = Some(journey),
-            Message::Place { .. } | Message::Ring { .. } | Message::Drive(_) | Message::Reply(_) => {}
+            Message::GoalStatus(goal_status) => self.goal_status = Some(goal_status),
+            Message::Place { .. } | Message::Ring { .. } | Message::Velocity(_) | Message::Reply(_) => {}
         }
     }
 
-    /// Whether the map heard so far is the robot's, as far as anyone can know: its digest is the one that the robot
-    /// sent last, and no frame was missed since. Cost: the CRC of 14 bytes a vertex.
+    /// Whether the replica equals the robot's map: its digest is the one that the robot sent last, and no frame was lost
+    /// since. Cost: the CRC of 14 bytes per vertex.
     pub fn is_converged(&self) -> bool {
         self.digest == Some(rows_digest(self.vertices, (0..self.vertices).filter_map(|vertex| self.row(vertex))))
     }
 
-    /// Whether the label of every vertex known to exist was heard. Edges may still be missing.
+    /// Whether the label of every known vertex was received. Edges may be missing.
     pub fn is_complete(&self) -> bool {
         self.labelled == bit(self.vertices).wrapping_sub(1)
     }
 
-    /// How many vertices the map has, as far as heard.
+    /// The number of known vertices.
     pub const fn vertices(&self) -> u8 {
         self.vertices
     }
 
-    /// All that was heard of a vertex; `None` while its label was not.
+    /// The label and the neighbours of a vertex; `None` until its label was received.
     pub fn row(&self, vertex: u8) -> Option<Row> {
         let &(radius_mm, visits) = self.labels.get(usize::from(vertex))?;
         let neighbours = self.neighbours(vertex);
         (self.labelled & bit(vertex) != 0).then_some(Row { vertex, radius_mm, visits, neighbours })
     }
 
-    /// The neighbours of a vertex as a bit row; 0 for a vertex that the map does not have.
+    /// The neighbours of a vertex as a set of bits; 0 for an unknown vertex.
     pub fn neighbours(&self, vertex: u8) -> u64 {
         self.neighbours.get(usize::from(vertex)).copied().unwrap_or(0)
     }
 
-    /// Every edge once, as pairs of vertices with the smaller number first.
+    /// Every edge once, as pairs of vertices with the smaller id first.
     pub fn edges(&self) -> impl Iterator<Item = (u8, u8)> + '_ {
         let later = |a, &b: &u8| a <= b;
         let neighbours = |a| VertexSet::from_bits(self.neighbours(a)).iter().map(u8::from);
         (0..self.vertices).flat_map(move |a| neighbours(a).filter(move |b| later(a, b)).map(move |b| (a, b)))
     }
 
-    /// The last introduction of the robot.
+    /// The last `Hello`.
     pub const fn hello(&self) -> Option<Hello> {
         self.hello
     }
 
-    /// Where the robot was last.
+    /// The last location of the robot.
     pub const fn location(&self) -> Option<Location> {
         self.location
     }
@@ -139,43 +139,42 @@ impl<const V: usize> Picture<V> {
         self.evidence
     }
 
-    /// How the firmware was last.
+    /// The last state of the firmware.
     pub const fn health(&self) -> Option<Health> {
         self.health
     }
 
-    /// Where the robot may be and how far the map is to be trusted, as last heard.
+    /// The last belief.
     pub const fn belief(&self) -> Option<Belief> {
         self.belief
     }
 
-    /// What the map explains worst, as last heard.
+    /// The last worst n-gram.
     pub const fn worst(&self) -> Option<Worst> {
         self.worst
     }
 
-    /// How the way to a vertex goes, as last heard.
-    pub const fn journey(&self) -> Option<Journey> {
-        self.journey
+    /// The last status of a goal.
+    pub const fn goal_status(&self) -> Option<GoalStatus> {
+        self.goal_status
     }
 
-    /// How often a kind of fault was seen, as far as heard.
+    /// The last count of a kind of fault.
     pub fn fault(&self, kind: FaultKind) -> u32 {
         self.faults.get(kind as usize).copied().unwrap_or(0)
     }
 
-    /// Gives the vertices their new numbers, wherever they were heard of. The map is that of the update once its size
-    /// follows; until then the digest of the map before means nothing.
-    fn rename(&mut self, renamed: &Renamed) {
+    /// Applies new vertex ids to everything that names a vertex. The digest is unknown until the size of the new map follows.
+    fn remap(&mut self, remapped: &Remapped) {
         self.digest = None;
-        self.vertices = renamed.vertices(self.vertices).min(V as u8);
-        self.labelled = renamed.apply(&mut self.labels, &mut self.neighbours, self.labelled);
-        self.location = self.location.and_then(|location| location.renamed(renamed));
+        self.vertices = remapped.count(self.vertices).min(V as u8);
+        self.labelled = remapped.apply(&mut self.labels, &mut self.neighbours, self.labelled);
+        self.location = self.location.and_then(|location| location.remapped(remapped));
         if let Some(belief) = &mut self.belief {
-            belief.rename(renamed);
+            belief.remap(remapped);
         }
-        self.worst = self.worst.and_then(|worst| worst.renamed(renamed));
-        self.journey = self.journey.and_then(|journey| journey.renamed(renamed));
+        self.worst = self.worst.and_then(|worst| worst.remapped(remapped));
+        self.goal_status = self.goal_status.and_then(|goal_status| goal_status.remapped(remapped));
     }
 
     fn set_label(&mut self, vertex: u8, radius_mm: u16, visits: u32) {
@@ -200,7 +199,7 @@ impl<const V: usize> Picture<V> {
         }
     }
 
-    /// Vertices that do not exist any more go with their edges.
+    /// Removes the vertices from `vertices` on and their edges.
     fn resize(&mut self, vertices: u8) {
         let kept = bit(vertices).wrapping_sub(1);
         for (row, vertex) in self.neighbours.iter_mut().zip(0u8..) {
@@ -211,7 +210,7 @@ impl<const V: usize> Picture<V> {
     }
 }
 
-impl<const V: usize> Default for Picture<V> {
+impl<const V: usize> Default for MapReplica<V> {
     fn default() -> Self {
         Self::new()
     }
@@ -223,13 +222,13 @@ mod tests {
     use crate::wire::List;
 
     #[test]
-    fn an_edge_to_a_vertex_that_is_renamed_beyond_the_capacity_is_left_out() {
+    fn an_edge_to_a_vertex_that_is_remapped_beyond_the_capacity_is_dropped() {
         let header = Header { sequence: 0, arrival: Arrival::InOrder };
-        let mut picture = Picture::<3>::new();
-        picture.apply(header, &Message::Edge { a: 0, b: 1, present: true });
-        picture.apply(header, &Message::Edge { a: 1, b: 1, present: true });
-        picture.apply(header, &Message::Renamed(Renamed { place_index: 0, names: List::new([5, 0]) }));
-        assert_eq!(picture.neighbours(0), 0b1);
-        assert!(picture.edges().eq([(0, 0)]));
+        let mut replica = MapReplica::<3>::new();
+        replica.apply(header, &Message::Edge { a: 0, b: 1, present: true });
+        replica.apply(header, &Message::Edge { a: 1, b: 1, present: true });
+        replica.apply(header, &Message::Remapped(Remapped { place_index: 0, vertices: List::new([5, 0]) }));
+        assert_eq!(replica.neighbours(0), 0b1);
+        assert!(replica.edges().eq([(0, 0)]));
     }
 }
