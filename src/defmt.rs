@@ -4,14 +4,12 @@
 
 use defmt::{Format, Formatter, write};
 
-use crate::place::{Place, PlaceConfigError};
+use crate::place::Place;
 use crate::ring::Echo;
-use crate::ring::drivers::{
-    AddressError, BridgeError, HcSr04ConfigError, MaxBotixConfigError, SonarError, SonarFault, Srf08ConfigError,
-};
+use crate::ring::drivers::{AddressError, BridgeError, SonarError, SonarFault};
 use crate::{
-    ConfigError, FaultCounters, FaultKind, Fingerprint, FingerprintError, MapperError, NgramError, NgramsFull,
-    Observation, PaperFactors, RobustFactors, Turn, Update, VertexId, VerticesFull, WeightFactors, WorstNgram,
+    ConfigError, FaultCounters, FaultKind, Fingerprint, FingerprintError, NgramError, NgramsFull, Observation,
+    PaperFactors, RobustFactors, Turn, Update, VertexId, VerticesFull, WeightFactors, WorstNgram,
 };
 
 /// A text for each variant of an enum without fields.
@@ -49,19 +47,6 @@ texts!(Turn {
     On => "on",
 });
 
-texts!(PlaceConfigError {
-    EquidistanceMm => "equidistance_mm is out of its range",
-    LeaveMm => "leave_mm is out of its range",
-    SeparationMrad => "separation_mrad is out of its range",
-    ConfirmFrames => "confirm_frames is out of its range",
-    LeaveFrames => "leave_frames is out of its range",
-    SettleFrames => "settle_frames is out of its range",
-    RangeMinMm => "range_min_mm is out of its range",
-    RangeMaxMm => "range_max_mm is out of its range",
-    LiveSensorsMin => "live_sensors_min is out of its range",
-    Bearing => "bearings_mrad is out of its range",
-});
-
 texts!(SonarFault {
     Silent => "timed out",
     OutOfRange => "returned a range outside its limits",
@@ -88,27 +73,6 @@ texts!(BridgeError {
     OutOfStep => "the bridge's reply makes no sense",
     TooLong => "more than 16 bytes in one direction",
     BaudRate => "no divider for this line speed",
-});
-
-texts!(HcSr04ConfigError {
-    Trigger => "trigger_us is out of its range",
-    Timeout => "rise_timeout_us or echo_timeout_us is out of its range",
-    StoppedClockPolls => "stopped_clock_polls is out of its range",
-    SpeedOfSound => "speed_of_sound_m_per_s is out of its range",
-    Range => "min_range_mm is above max_range_mm",
-});
-
-texts!(MaxBotixConfigError {
-    FirstAddress => "first_address is out of its range",
-    Ranging => "ranging_ms is out of its range",
-});
-
-texts!(Srf08ConfigError {
-    FirstAddress => "first_address is out of its range",
-    Timeout => "timeout_ms is out of its range",
-    PollInterval => "poll_interval_us is out of its range",
-    SpeedOfSound => "speed_of_sound_m_per_s is out of its range",
-    Range => "min_range_mm is above max_range_mm",
 });
 
 impl Format for Fingerprint {
@@ -204,7 +168,14 @@ impl Format for SonarError {
 
 impl Format for ConfigError {
     fn format(&self, f: Formatter<'_>) {
-        write!(f, "{=str} is out of its range", self.0);
+        match self {
+            Self::OutOfRange { field, value, min, max } => {
+                write!(f, "{=str} is {=i32}, but must be from {=i32} to {=i32}", field, value, min, max);
+            }
+            Self::ReservedAddress { field, address } => {
+                write!(f, "{=str}: a sensor would have the reserved address {=u8:#x}", field, address);
+            }
+        }
     }
 }
 
@@ -226,15 +197,6 @@ impl Format for NgramsFull {
 impl Format for VerticesFull {
     fn format(&self, f: Formatter<'_>) {
         write!(f, "the map has no room for another vertex");
-    }
-}
-
-impl Format for MapperError {
-    fn format(&self, f: Formatter<'_>) {
-        match self {
-            Self::Place(error) => error.format(f),
-            Self::Filter(error) => error.format(f),
-        }
     }
 }
 

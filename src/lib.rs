@@ -135,6 +135,7 @@
 mod bearing;
 #[cfg(feature = "snapshot")]
 mod checksum;
+mod config_error;
 #[cfg(feature = "defmt")]
 mod defmt;
 pub mod drive;
@@ -152,14 +153,15 @@ pub mod robot;
 #[cfg(feature = "wire")]
 pub mod wire;
 
+pub use config_error::ConfigError;
 pub use fault::{FaultCounters, FaultKind};
 pub use filter::{
-    Config, ConfigError, Consistency, Direction, Evidence, Filter, FilterCapacities, History, Ngram, NgramError,
-    NgramLength, NgramTable, NgramsFull, Observation, PaperFactors, PaperFilter, Particle, Prior, RobustConfig,
-    RobustFactors, RobustFilter, Turn, Update, WeightFactors, WorstNgram,
+    Config, Consistency, Direction, Evidence, Filter, FilterCapacities, History, Ngram, NgramError, NgramLength,
+    NgramTable, NgramsFull, Observation, PaperFactors, PaperFilter, Particle, Prior, RobustConfig, RobustFactors,
+    RobustFilter, Turn, Update, WeightFactors, WorstNgram,
 };
 pub use map::{Map, PerVertex, VertexId, VertexSet, VerticesFull};
-pub use mapper::{Mapper, MapperConfig, MapperError};
+pub use mapper::{Mapper, MapperConfig};
 pub use place::{Fingerprint, FingerprintError};
 
 /// The code in the README is compiled as a test.

@@ -1,9 +1,8 @@
 //! From ring frames to a map: ring frame → place → hypotheses → map update.
 
-use crate::place::{Place, PlaceConfig, PlaceConfigError, PlaceDetector};
+use crate::place::{Place, PlaceConfig, PlaceDetector};
 use crate::ring::{RingFrame, RingGeometry};
 use crate::{ConfigError, FaultCounters, Filter, Map, Observation, RobustConfig, Turn, Update};
-use core::fmt;
 
 /// The most refinement steps between two places. Later steps rarely improve the map, and a robot may stand for days.
 const REFINEMENT_STEPS: u16 = 64;
@@ -56,10 +55,10 @@ impl<const SONARS: usize, const V: usize, F: Filter<V>> Mapper<SONARS, V, F> {
     /// Starts with an empty map.
     ///
     /// # Errors
-    /// [`MapperError`] names the first setting that is out of its range; the mapper must then be started again.
-    pub fn start(&mut self, config: &MapperConfig<SONARS, F::Config>) -> Result<(), MapperError> {
-        self.detector.start(config.place, config.geometry).map_err(MapperError::Place)?;
-        self.filter.start(config.filter, config.seed).map_err(MapperError::Filter)?;
+    /// [`ConfigError`] names the first setting that is out of its range; the mapper must then be started again.
+    pub fn start(&mut self, config: &MapperConfig<SONARS, F::Config>) -> Result<(), ConfigError> {
+        self.detector.start(config.place, config.geometry)?;
+        self.filter.start(config.filter, config.seed)?;
         self.starts_sequence = false;
         self.refinement_steps = 0;
         Ok(())
@@ -88,11 +87,11 @@ impl<const SONARS: usize, const V: usize, F: Filter<V>> Mapper<SONARS, V, F> {
     /// Changes the settings and keeps the map.
     ///
     /// # Errors
-    /// [`MapperError`] names the first setting that is out of its range; nothing has changed then.
-    pub fn set_config(&mut self, place: PlaceConfig, filter: F::Config) -> Result<(), MapperError> {
-        place.check(SONARS).map_err(MapperError::Place)?;
-        self.filter.set_config(filter).map_err(MapperError::Filter)?;
-        self.detector.set_config(place).map_err(MapperError::Place)
+    /// [`ConfigError`] names the first setting that is out of its range; nothing has changed then.
+    pub fn set_config(&mut self, place: PlaceConfig, filter: F::Config) -> Result<(), ConfigError> {
+        place.check(SONARS)?;
+        self.filter.set_config(filter)?;
+        self.detector.set_config(place)
     }
 
     /// Announces that the next place may not be a neighbour of the last one: the robot was kidnapped, or its drive lost the
@@ -140,23 +139,3 @@ impl<const SONARS: usize, const V: usize, F: Filter<V>> Default for Mapper<SONAR
         Self::new()
     }
 }
-
-/// A setting of one of the stages is out of its range.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum MapperError {
-    /// A setting of the place detector.
-    Place(PlaceConfigError),
-    /// A setting of the filter.
-    Filter(ConfigError),
-}
-
-impl fmt::Display for MapperError {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Place(error) => error.fmt(f),
-            Self::Filter(error) => error.fmt(f),
-        }
-    }
-}
-
-impl core::error::Error for MapperError {}

@@ -11,7 +11,7 @@
 //! detector.start(reference::PLACE, RingGeometry::even())?;
 //! // Silence all around is no place.
 //! assert!(detector.observe(&RingFrame { echoes: [Echo::Silence; SONARS] }).is_none());
-//! # Ok::<(), toposlam::place::PlaceConfigError>(())
+//! # Ok::<(), toposlam::ConfigError>(())
 //! ```
 
 use crate::{

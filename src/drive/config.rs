@@ -1,6 +1,6 @@
 //! Settings of the drive, checked once at the start.
 
-use core::fmt;
+use crate::ConfigError;
 
 /// Settings of the motion along the Voronoi graph.
 ///
@@ -35,17 +35,11 @@ impl DriveConfig {
         Self { speed_permille: 0, look_ahead_mm: 0, arrival_tolerance_mm: 0, clearance_mm: 0, timeout_frames: 0 };
 
     /// Whether every field is in its range.
-    pub(super) const fn check(&self) -> Result<(), DriveConfigError> {
-        if self.speed_permille == 0 || self.speed_permille > 1000 {
-            return Err(DriveConfigError::SpeedPermille);
-        }
-        if self.look_ahead_mm == 0 {
-            return Err(DriveConfigError::LookAheadMm);
-        }
-        if self.timeout_frames == 0 {
-            return Err(DriveConfigError::TimeoutFrames);
-        }
-        Ok(())
+    pub(super) fn check(&self) -> Result<(), ConfigError> {
+        let most = u16::MAX.into();
+        ConfigError::check("speed_permille", self.speed_permille.into(), 1, 1000)?;
+        ConfigError::check("look_ahead_mm", self.look_ahead_mm.into(), 1, most)?;
+        ConfigError::check("timeout_frames", self.timeout_frames.into(), 1, most)
     }
 }
 
@@ -54,30 +48,6 @@ impl Default for DriveConfig {
         Self::DEFAULT
     }
 }
-
-/// Which field of a [`DriveConfig`] cannot be.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[non_exhaustive]
-pub enum DriveConfigError {
-    /// `speed_permille`: 0, or above 1000.
-    SpeedPermille,
-    /// `look_ahead_mm`: 0.
-    LookAheadMm,
-    /// `timeout_frames`: 0.
-    TimeoutFrames,
-}
-
-impl fmt::Display for DriveConfigError {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(match self {
-            Self::SpeedPermille => "speed_permille: must be from 1 to 1000",
-            Self::LookAheadMm => "look_ahead_mm: must not be 0",
-            Self::TimeoutFrames => "timeout_frames: must not be 0",
-        })
-    }
-}
-
-impl core::error::Error for DriveConfigError {}
 
 #[cfg(test)]
 mod tests {
@@ -88,13 +58,13 @@ mod tests {
         let good = DriveConfig::DEFAULT;
         assert_eq!(good.check(), Ok(()));
         let wrong = [
-            (DriveConfig { speed_permille: 0, ..good }, DriveConfigError::SpeedPermille),
-            (DriveConfig { speed_permille: 1001, ..good }, DriveConfigError::SpeedPermille),
-            (DriveConfig { look_ahead_mm: 0, ..good }, DriveConfigError::LookAheadMm),
-            (DriveConfig { timeout_frames: 0, ..good }, DriveConfigError::TimeoutFrames),
+            (DriveConfig { speed_permille: 0, ..good }, "speed_permille"),
+            (DriveConfig { speed_permille: 1001, ..good }, "speed_permille"),
+            (DriveConfig { look_ahead_mm: 0, ..good }, "look_ahead_mm"),
+            (DriveConfig { timeout_frames: 0, ..good }, "timeout_frames"),
         ];
-        for (config, error) in wrong {
-            assert_eq!(config.check(), Err(error));
+        for (config, field) in wrong {
+            assert_eq!(config.check().unwrap_err().field(), field);
         }
     }
 }

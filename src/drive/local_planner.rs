@@ -2,11 +2,11 @@
 
 use super::rotation::RotationEstimate;
 use super::voronoi::{Sector, edge_heading_mrad, meet_point_offset_mm};
-use super::{DriveConfig, DriveConfigError, VelocityCommand};
+use super::{DriveConfig, VelocityCommand};
 use crate::bearing::{HALF_TURN_MRAD, rotated, turn_mrad};
 use crate::place::{Obstacle, Obstacles, Openings, RingScan};
 use crate::ring::Echo;
-use crate::{FaultCounters, FaultKind, Turn};
+use crate::{ConfigError, FaultCounters, FaultKind, Turn};
 
 /// An opening is matched to the one of the frame before when its bearing changed by at most this, in milliradians.
 const SAME_OPENING_MRAD: u16 = 700;
@@ -107,7 +107,7 @@ impl LocalPlanner {
         *self = Self { config, ..Self::new() };
     }
 
-    pub(super) fn set_speed(&mut self, speed_permille: u16) -> Result<(), DriveConfigError> {
+    pub(super) fn set_speed(&mut self, speed_permille: u16) -> Result<(), ConfigError> {
         let config = DriveConfig { speed_permille, ..self.config };
         config.check()?;
         self.config = config;

@@ -29,16 +29,16 @@ mod route_planner;
 mod voronoi;
 mod wheels;
 
-pub use config::{DriveConfig, DriveConfigError};
+pub use config::DriveConfig;
 pub use local_planner::DriveState;
 pub use route_planner::{Goal, GoalStatus};
-pub use wheels::{DifferentialDrive, MotorError, Wheel, WheelSpeeds, WheelsConfig, WheelsConfigError};
+pub use wheels::{DifferentialDrive, MotorError, Wheel, WheelSpeeds, WheelsConfig};
 
 #[cfg(feature = "snapshot")]
 pub(crate) use departures::is_departure;
 
 use crate::place::{Place, PlaceDetector};
-use crate::{FaultCounters, Filter, Turn, VertexId};
+use crate::{ConfigError, FaultCounters, Filter, Turn, VertexId};
 use local_planner::LocalPlanner;
 use route_planner::RoutePlanner;
 
@@ -76,7 +76,7 @@ impl<const V: usize, const HISTORY: usize> Drive<V, HISTORY> {
     ///
     /// # Errors
     /// The first setting that is out of its range; the drive does not change then.
-    pub fn start(&mut self, config: DriveConfig, seed: u64) -> Result<(), DriveConfigError> {
+    pub fn start(&mut self, config: DriveConfig, seed: u64) -> Result<(), ConfigError> {
         config.check()?;
         self.local_planner.start(config);
         self.route_planner.start(seed);
@@ -120,8 +120,8 @@ impl<const V: usize, const HISTORY: usize> Drive<V, HISTORY> {
     /// Sets the speed along edges, in thousandths of full speed, 1 to 1000.
     ///
     /// # Errors
-    /// [`DriveConfigError::SpeedPermille`]; the speed does not change then.
-    pub fn set_speed(&mut self, speed_permille: u16) -> Result<(), DriveConfigError> {
+    /// [`ConfigError`]; the speed does not change then.
+    pub fn set_speed(&mut self, speed_permille: u16) -> Result<(), ConfigError> {
         self.local_planner.set_speed(speed_permille)
     }
 

@@ -5,6 +5,7 @@ use core::fmt;
 use embedded_hal::{digital::OutputPin, pwm::SetDutyCycle};
 
 use super::VelocityCommand;
+use crate::ConfigError;
 
 /// How a robot with two driven wheels turns a velocity into wheel speeds.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -28,20 +29,11 @@ impl WheelsConfig {
     ///
     /// # Errors
     /// The first field that is not.
-    pub const fn check(&self) -> Result<(), WheelsConfigError> {
-        if self.spin_from_mrad < 1 || self.spin_from_mrad > 3142 {
-            return Err(WheelsConfigError::SpinFromMrad);
-        }
-        if self.spin_permille == 0 || self.spin_permille > 1000 {
-            return Err(WheelsConfigError::SpinPermille);
-        }
-        if self.steer_permille_per_rad == 0 || self.steer_permille_per_rad > 2000 {
-            return Err(WheelsConfigError::SteerPermillePerRad);
-        }
-        if self.dead_zone_permille >= 1000 {
-            return Err(WheelsConfigError::DeadZonePermille);
-        }
-        Ok(())
+    pub fn check(&self) -> Result<(), ConfigError> {
+        ConfigError::check("spin_from_mrad", self.spin_from_mrad.into(), 1, 3142)?;
+        ConfigError::check("spin_permille", self.spin_permille.into(), 1, 1000)?;
+        ConfigError::check("steer_permille_per_rad", self.steer_permille_per_rad.into(), 1, 2000)?;
+        ConfigError::check("dead_zone_permille", self.dead_zone_permille.into(), 0, 999)
     }
 }
 
@@ -50,33 +42,6 @@ impl Default for WheelsConfig {
         Self::DEFAULT
     }
 }
-
-/// Which field of a [`WheelsConfig`] cannot be.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[non_exhaustive]
-pub enum WheelsConfigError {
-    /// `spin_from_mrad`: outside 1 to 3142.
-    SpinFromMrad,
-    /// `spin_permille`: outside 1 to 1000.
-    SpinPermille,
-    /// `steer_permille_per_rad`: outside 1 to 2000.
-    SteerPermillePerRad,
-    /// `dead_zone_permille`: 1000 or more.
-    DeadZonePermille,
-}
-
-impl fmt::Display for WheelsConfigError {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(match self {
-            Self::SpinFromMrad => "spin_from_mrad: must be from 1 to 3142",
-            Self::SpinPermille => "spin_permille: must be from 1 to 1000",
-            Self::SteerPermillePerRad => "steer_permille_per_rad: must be from 1 to 2000",
-            Self::DeadZonePermille => "dead_zone_permille: must be below 1000",
-        })
-    }
-}
-
-impl core::error::Error for WheelsConfigError {}
 
 /// The speeds of the two wheels, in thousandths of full speed, −1000 to 1000, forward positive.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -118,11 +83,7 @@ impl<PWM: SetDutyCycle, DIRECTION: OutputPin> DifferentialDrive<PWM, DIRECTION> 
     ///
     /// # Errors
     /// Names the field of the configuration that cannot be.
-    pub fn new(
-        left: (PWM, DIRECTION),
-        right: (PWM, DIRECTION),
-        config: WheelsConfig,
-    ) -> Result<Self, WheelsConfigError> {
+    pub fn new(left: (PWM, DIRECTION), right: (PWM, DIRECTION), config: WheelsConfig) -> Result<Self, ConfigError> {
         config.check()?;
         Ok(Self { left, right, config })
     }

@@ -1,8 +1,8 @@
 //! What the stages around a filter ask of it.
 
 use super::robust::NGRAM_LENGTH;
-use super::{ConfigError, PaperFilter, RobustConfig, RobustFilter, Update, WorstNgram};
-use crate::{Config, FaultCounters, Map, Observation, VertexId};
+use super::{PaperFilter, RobustConfig, RobustFilter, Update, WorstNgram};
+use crate::{Config, ConfigError, FaultCounters, Map, Observation, VertexId};
 
 /// What a filter with some settings has room for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -14,7 +14,6 @@ pub use paper::{
 pub use robust::{RobustConfig, RobustFilter};
 
 use crate::VertexId;
-use core::fmt;
 use rand_core::SeedableRng;
 use rand_xoshiro::Xoshiro128PlusPlus;
 
@@ -139,15 +138,3 @@ impl WorstNgram {
         self.vertices.get(..usize::from(self.length)).unwrap_or(&self.vertices)
     }
 }
-
-/// A field of a [`Config`] is out of its range; it holds the name of the field.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct ConfigError(pub &'static str);
-
-impl fmt::Display for ConfigError {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{} is out of its range", self.0)
-    }
-}
-
-impl core::error::Error for ConfigError {}

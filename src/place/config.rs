@@ -1,6 +1,6 @@
 //! The place detector's settings: documented defaults, checked once.
 
-use core::fmt;
+use crate::ConfigError;
 
 /// When a ring frame shows a meet point, and when the robot has left it.
 ///
@@ -66,35 +66,17 @@ impl PlaceConfig {
     ///
     /// # Errors
     /// The first field that is not.
-    pub(crate) const fn check(&self, sonars: usize) -> Result<(), PlaceConfigError> {
-        if self.equidistance_mm == 0 {
-            return Err(PlaceConfigError::EquidistanceMm);
-        }
-        if self.leave_mm < self.equidistance_mm {
-            return Err(PlaceConfigError::LeaveMm);
-        }
-        if self.separation_mrad == 0 || self.separation_mrad > 2094 {
-            return Err(PlaceConfigError::SeparationMrad);
-        }
-        if self.confirm_frames == 0 {
-            return Err(PlaceConfigError::ConfirmFrames);
-        }
-        if self.leave_frames == 0 {
-            return Err(PlaceConfigError::LeaveFrames);
-        }
-        if self.settle_frames < self.confirm_frames {
-            return Err(PlaceConfigError::SettleFrames);
-        }
-        if self.range_min_mm == 0 {
-            return Err(PlaceConfigError::RangeMinMm);
-        }
-        if self.range_max_mm <= self.range_min_mm || self.range_max_mm == u16::MAX {
-            return Err(PlaceConfigError::RangeMaxMm);
-        }
-        if self.live_sensors_min < 3 || self.live_sensors_min as usize > sonars {
-            return Err(PlaceConfigError::LiveSensorsMin);
-        }
-        Ok(())
+    pub(crate) fn check(&self, sonars: usize) -> Result<(), ConfigError> {
+        let most = u16::MAX.into();
+        ConfigError::check("equidistance_mm", self.equidistance_mm.into(), 1, most)?;
+        ConfigError::check("leave_mm", self.leave_mm.into(), self.equidistance_mm.into(), most)?;
+        ConfigError::check("separation_mrad", self.separation_mrad.into(), 1, 2094)?;
+        ConfigError::check("confirm_frames", self.confirm_frames.into(), 1, 255)?;
+        ConfigError::check("leave_frames", self.leave_frames.into(), 1, 255)?;
+        ConfigError::check("settle_frames", self.settle_frames.into(), self.confirm_frames.into(), 255)?;
+        ConfigError::check("range_min_mm", self.range_min_mm.into(), 1, most)?;
+        ConfigError::check("range_max_mm", self.range_max_mm.into(), i32::from(self.range_min_mm) + 1, most - 1)?;
+        ConfigError::check("live_sensors_min", self.live_sensors_min.into(), 3, sonars as i32)
     }
 }
 
@@ -103,51 +85,6 @@ impl Default for PlaceConfig {
         Self::DEFAULT
     }
 }
-
-/// Which setting of the place detector is out of its range.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[non_exhaustive]
-pub enum PlaceConfigError {
-    /// `equidistance_mm` is 0.
-    EquidistanceMm,
-    /// `leave_mm` is below `equidistance_mm`.
-    LeaveMm,
-    /// `separation_mrad` is 0 or above 2094 (a third of a turn, so that three obstacles fit).
-    SeparationMrad,
-    /// `confirm_frames` is 0.
-    ConfirmFrames,
-    /// `leave_frames` is 0.
-    LeaveFrames,
-    /// `settle_frames` is below `confirm_frames`.
-    SettleFrames,
-    /// `range_min_mm` is 0.
-    RangeMinMm,
-    /// `range_max_mm` is not above `range_min_mm`, or 65535.
-    RangeMaxMm,
-    /// `live_sensors_min` is below 3 or above the size of the ring.
-    LiveSensorsMin,
-    /// A bearing of the ring's geometry is beyond −3142 to 3142 mrad.
-    Bearing,
-}
-
-impl fmt::Display for PlaceConfigError {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(match self {
-            Self::EquidistanceMm => "equidistance_mm must be above 0",
-            Self::LeaveMm => "leave_mm must not be below equidistance_mm",
-            Self::SeparationMrad => "separation_mrad must be 1 to 2094",
-            Self::ConfirmFrames => "confirm_frames must be above 0",
-            Self::LeaveFrames => "leave_frames must be above 0",
-            Self::SettleFrames => "settle_frames must not be below confirm_frames",
-            Self::RangeMinMm => "range_min_mm must be above 0",
-            Self::RangeMaxMm => "range_max_mm must be above range_min_mm and below 65535",
-            Self::LiveSensorsMin => "live_sensors_min must be 3 to the size of the ring",
-            Self::Bearing => "bearings_mrad must be -3142 to 3142",
-        })
-    }
-}
-
-impl core::error::Error for PlaceConfigError {}
 
 #[cfg(test)]
 mod tests {
@@ -158,18 +95,18 @@ mod tests {
         let good = PlaceConfig::DEFAULT;
         assert_eq!(good.check(16), Ok(()));
         let bad = [
-            (PlaceConfig { equidistance_mm: 0, ..good }, PlaceConfigError::EquidistanceMm),
-            (PlaceConfig { leave_mm: 149, ..good }, PlaceConfigError::LeaveMm),
-            (PlaceConfig { separation_mrad: 2095, ..good }, PlaceConfigError::SeparationMrad),
-            (PlaceConfig { confirm_frames: 0, ..good }, PlaceConfigError::ConfirmFrames),
-            (PlaceConfig { leave_frames: 0, ..good }, PlaceConfigError::LeaveFrames),
-            (PlaceConfig { settle_frames: 2, ..good }, PlaceConfigError::SettleFrames),
-            (PlaceConfig { range_min_mm: 0, ..good }, PlaceConfigError::RangeMinMm),
-            (PlaceConfig { range_max_mm: 30, ..good }, PlaceConfigError::RangeMaxMm),
-            (PlaceConfig { live_sensors_min: 17, ..good }, PlaceConfigError::LiveSensorsMin),
+            (PlaceConfig { equidistance_mm: 0, ..good }, "equidistance_mm"),
+            (PlaceConfig { leave_mm: 149, ..good }, "leave_mm"),
+            (PlaceConfig { separation_mrad: 2095, ..good }, "separation_mrad"),
+            (PlaceConfig { confirm_frames: 0, ..good }, "confirm_frames"),
+            (PlaceConfig { leave_frames: 0, ..good }, "leave_frames"),
+            (PlaceConfig { settle_frames: 2, ..good }, "settle_frames"),
+            (PlaceConfig { range_min_mm: 0, ..good }, "range_min_mm"),
+            (PlaceConfig { range_max_mm: 30, ..good }, "range_max_mm"),
+            (PlaceConfig { live_sensors_min: 17, ..good }, "live_sensors_min"),
         ];
-        for (config, error) in bad {
-            assert_eq!(config.check(16), Err(error));
+        for (config, field) in bad {
+            assert_eq!(config.check(16).unwrap_err().field(), field);
         }
     }
 }

@@ -2,9 +2,9 @@
 
 use super::scan::{MeetPoint, RingScan};
 use super::smoothing::{DEAD_MM, RangeSmoother, SILENT_MM, bridge_dead_sensors};
-use super::{Fingerprint, PlaceConfig, PlaceConfigError};
+use super::{Fingerprint, PlaceConfig};
 use crate::ring::{Echo, RingFrame, RingGeometry};
-use crate::{FaultCounters, FaultKind};
+use crate::{ConfigError, FaultCounters, FaultKind};
 
 /// The radius is the mean over at most this many frames.
 const AVERAGED_FRAMES: usize = 8;
@@ -97,10 +97,10 @@ impl<const SONARS: usize> PlaceDetector<SONARS> {
     ///
     /// # Errors
     /// The first setting that is out of its range; the detector does not change then.
-    pub fn start(&mut self, config: PlaceConfig, geometry: RingGeometry<SONARS>) -> Result<(), PlaceConfigError> {
+    pub fn start(&mut self, config: PlaceConfig, geometry: RingGeometry<SONARS>) -> Result<(), ConfigError> {
         config.check(SONARS)?;
-        if geometry.bearings_mrad.iter().any(|bearing_mrad| !(-3142..=3142).contains(bearing_mrad)) {
-            return Err(PlaceConfigError::Bearing);
+        for bearing_mrad in geometry.bearings_mrad {
+            ConfigError::check("bearings_mrad", bearing_mrad.into(), -3142, 3142)?;
         }
         self.config = config;
         for (sensor, bearing_mrad) in (0_u16..).zip(geometry.bearings_mrad) {
@@ -128,7 +128,7 @@ impl<const SONARS: usize> PlaceDetector<SONARS> {
     ///
     /// # Errors
     /// The first setting that is out of its range; the detector does not change then.
-    pub fn set_config(&mut self, config: PlaceConfig) -> Result<(), PlaceConfigError> {
+    pub fn set_config(&mut self, config: PlaceConfig) -> Result<(), ConfigError> {
         config.check(SONARS)?;
         self.config = config;
         Ok(())

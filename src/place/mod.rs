@@ -34,7 +34,7 @@
 //! }
 //! assert_eq!(places.len(), 1);
 //! assert!((800..=820).contains(&places[0].fingerprint.radius_mm()));
-//! # Ok::<(), toposlam::place::PlaceConfigError>(())
+//! # Ok::<(), toposlam::ConfigError>(())
 //! ```
 
 mod config;
@@ -44,7 +44,7 @@ mod openings;
 mod scan;
 mod smoothing;
 
-pub use config::{PlaceConfig, PlaceConfigError};
+pub use config::PlaceConfig;
 pub use detector::{Place, PlaceDetector};
 pub use fingerprint::{Fingerprint, FingerprintError};
 pub use openings::Openings;

@@ -26,7 +26,7 @@ const SLANTED_WALL_PERCENT: core::ops::Range<u32> = 67..92;
 /// let obstacles = detector.scan().obstacles();
 /// assert_eq!(obstacles.equidistant().count(), 2);
 /// assert_eq!(detector.scan().openings(&obstacles).bearings_mrad().len(), 2);
-/// # Ok::<(), toposlam::place::PlaceConfigError>(())
+/// # Ok::<(), toposlam::ConfigError>(())
 /// ```
 ///
 /// [`PlaceDetector::scan`]: super::PlaceDetector::scan

@@ -2,7 +2,7 @@
 
 use super::*;
 use crate::ring::{Echo, RingFrame, RingGeometry};
-use crate::{FaultCounters, FaultKind};
+use crate::{ConfigError, FaultCounters, FaultKind};
 
 /// An even ring and its frame in a corridor 2 m wide, with the end wall `end_mm` straight ahead. Each sensor measures along
 /// its axis.
@@ -157,7 +157,8 @@ fn a_bearing_beyond_half_a_turn_is_rejected() {
     let mut geometry = corridor::<16>(1000).0;
     geometry.bearings_mrad[3] = 3143;
     let refused = PlaceDetector::<16>::new().start(PlaceConfig::DEFAULT, geometry);
-    assert_eq!(refused, Err(PlaceConfigError::Bearing));
+    let error = ConfigError::OutOfRange { field: "bearings_mrad", value: 3143, min: -3142, max: 3142 };
+    assert_eq!(refused, Err(error));
 }
 
 /// A frame in a corridor 1.6 m wide with the robot's heading `heading_deg` off its axis. A sensor with a cone of 30° detects

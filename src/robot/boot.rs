@@ -2,7 +2,8 @@
 
 use embedded_storage::nor_flash::NorFlash;
 
-use super::{Robot, RobotConfig, RobotError};
+use super::{Robot, RobotConfig};
+use crate::ConfigError;
 use crate::persist::store::{BootPolicy, BootReport, Store, resume};
 use crate::wire::Staging;
 
@@ -20,7 +21,7 @@ impl<'buffer, const SONARS: usize, const N: usize, const V: usize, const HISTORY
         buffer: &'buffer mut [u8],
         store: &mut Store<FLASH>,
         policy: BootPolicy,
-    ) -> Result<BootReport, RobotError> {
+    ) -> Result<BootReport, ConfigError> {
         self.start(config, &mut [])?;
         let report = resume(store, buffer, policy, |bytes, place| self.restore(bytes, place));
         self.staging = Staging::new(buffer);

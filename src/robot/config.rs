@@ -1,11 +1,9 @@
 //! The robot's settings: those of its stages, and how its main loop runs.
 
-use core::fmt;
-
-use crate::drive::{DriveConfig, DriveConfigError};
+use crate::drive::DriveConfig;
 use crate::persist::snapshot::SnapshotPolicy;
 use crate::wire::{Capacities, Hello, ResetCause};
-use crate::{Filter, MapperConfig, MapperError, RobustConfig};
+use crate::{Filter, MapperConfig, RobustConfig};
 
 /// The settings of every stage.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -40,23 +38,3 @@ impl<const SONARS: usize> RobotConfig<SONARS> {
         Hello::new(self.boot, self.reset_cause, self.mapper.seed, capacities)
     }
 }
-
-/// A setting of one of the stages is out of its range.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum RobotError {
-    /// One of the mapper's.
-    Mapper(MapperError),
-    /// One of the drive's.
-    Drive(DriveConfigError),
-}
-
-impl fmt::Display for RobotError {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Mapper(error) => error.fmt(f),
-            Self::Drive(error) => error.fmt(f),
-        }
-    }
-}
-
-impl core::error::Error for RobotError {}

@@ -44,7 +44,7 @@
 //! let frame = RingFrame { echoes: [Echo::Silence; SONARS] };
 //! robot.turn(&frame, &FaultCounters::new(), &mut Bare);
 //! assert_eq!(robot.mapper().map().vertices().len(), 0);
-//! # Ok::<(), toposlam::robot::RobotError>(())
+//! # Ok::<(), toposlam::ConfigError>(())
 //! ```
 
 mod board;
@@ -54,7 +54,7 @@ mod commands;
 mod config;
 
 pub use board::{Board, SaveError};
-pub use config::{RobotConfig, RobotError};
+pub use config::RobotConfig;
 
 use crate::drive::{Drive, Goal, GoalStatus, VelocityCommand};
 use crate::persist::Persist;
@@ -62,7 +62,7 @@ use crate::persist::snapshot::{Resume, Snapshot, SnapshotError, SnapshotPolicy, 
 use crate::place::Place;
 use crate::ring::RingFrame;
 use crate::wire::{self, Echoes, Encoder, Health, Inbox, MAX_FRAME_BYTES, Message, QueueFull, Reporter, Staging};
-use crate::{FaultCounters, FaultKind, Mapper, RobustFilter, Update};
+use crate::{ConfigError, FaultCounters, FaultKind, Mapper, RobustFilter, Update};
 
 /// How often the robot sends a `Hello`, in ring frames.
 const FRAMES_PER_HELLO: u16 = 100;
@@ -133,10 +133,10 @@ impl<'buffer, const SONARS: usize, const N: usize, const V: usize, const HISTORY
     /// [`RobustFilter::SNAPSHOT_BYTES`] and `HISTORY + 16` more has room for every hypothesis, and without one there are none.
     ///
     /// # Errors
-    /// [`RobotError`] names the first setting that is out of its range; the robot must then be started again.
-    pub fn start(&mut self, config: &RobotConfig<SONARS>, buffer: &'buffer mut [u8]) -> Result<(), RobotError> {
-        self.mapper.start(&config.mapper).map_err(RobotError::Mapper)?;
-        self.drive.start(config.drive, config.mapper.seed).map_err(RobotError::Drive)?;
+    /// [`ConfigError`] names the first setting that is out of its range; the robot must then be started again.
+    pub fn start(&mut self, config: &RobotConfig<SONARS>, buffer: &'buffer mut [u8]) -> Result<(), ConfigError> {
+        self.mapper.start(&config.mapper)?;
+        self.drive.start(config.drive, config.mapper.seed)?;
         self.config = *config;
         self.reporter.start(config.hello::<V, RobustFilter<N, V, HISTORY>>(), FRAMES_PER_HELLO);
         self.inbox = Inbox::new();

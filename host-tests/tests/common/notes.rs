@@ -28,7 +28,10 @@ impl Filter<VERTICES> for Notes {
 
     fn start(&mut self, history: u16, _: u64) -> Result<(), ConfigError> {
         self.history = history;
-        if history == 0 { Err(ConfigError("history")) } else { Ok(()) }
+        if history > 0 {
+            return Ok(());
+        }
+        Err(ConfigError::OutOfRange { field: "history", value: 0, min: 1, max: u16::MAX.into() })
     }
 
     fn set_config(&mut self, _: u16) -> Result<(), ConfigError> {

@@ -24,7 +24,7 @@
 use toposlam::reference::{self, PaperReference, VERTICES};
 use toposlam::ring::{RingFrame, RingGeometry};
 use toposlam::wire::{Belief, Worst};
-use toposlam::{FaultCounters, Filter, Map, Mapper, MapperConfig, MapperError, Turn};
+use toposlam::{ConfigError, FaultCounters, Filter, Map, Mapper, MapperConfig, Turn};
 
 use toposlam_sim::Step;
 use toposlam_sim::exploration::Exploration;
@@ -70,7 +70,7 @@ impl<const SONARS: usize> Mapping<SONARS> {
     ///
     /// # Errors
     /// The first setting that is out of its range.
-    pub fn start(geometry: RingGeometry<SONARS>, filter: FilterChoice) -> Result<Self, MapperError> {
+    pub fn start(geometry: RingGeometry<SONARS>, filter: FilterChoice) -> Result<Self, ConfigError> {
         let stages = match filter {
             FilterChoice::Robust => Stages::Robust(started(geometry, reference::FILTER)?),
             FilterChoice::Paper => Stages::Paper(started(geometry, reference::PAPER_FILTER)?, Ancestry::new()),
@@ -174,7 +174,7 @@ pub fn score_exploration(exploration: &Exploration<'_>) -> MapScore {
 fn started<const SONARS: usize, F: Filter<VERTICES>>(
     geometry: RingGeometry<SONARS>,
     filter: F::Config,
-) -> Result<Box<Mapper<SONARS, VERTICES, F>>, MapperError> {
+) -> Result<Box<Mapper<SONARS, VERTICES, F>>, ConfigError> {
     let mut mapper = Box::new(Mapper::new());
     let (place, seed) = (reference::PLACE, reference::SEED);
     mapper.start(&MapperConfig { geometry, place, filter, seed })?;

@@ -4,7 +4,7 @@ use core::hint::black_box;
 
 use static_cell::ConstStaticCell;
 use toposlam::{
-    FaultCounters, MapperError,
+    ConfigError, FaultCounters,
     persist::snapshot::{Resume, Snapshot, SnapshotError, SnapshotPolicy, Writer},
     reference,
     wire::{Reporter, map_digest},
@@ -19,7 +19,7 @@ pub(crate) fn mapper() {
     static MAPPER: ConstStaticCell<reference::RobotMapper> = ConstStaticCell::new(reference::RobotMapper::new());
     let Some(mapper) = MAPPER.try_take() else { return };
     if let Err(error) = mapper.start(&reference::MAPPER.opaque()) {
-        show::<MapperError>(error);
+        show::<ConfigError>(error);
     }
     for _ in 0..black_box(9) {
         black_box(mapper.observe(&any_frame(), any_turn()));

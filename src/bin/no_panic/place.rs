@@ -4,7 +4,8 @@ use core::hint::black_box;
 
 use static_cell::ConstStaticCell;
 use toposlam::{
-    place::{PlaceConfig, PlaceConfigError, PlaceDetector},
+    ConfigError,
+    place::{PlaceConfig, PlaceDetector},
     ring::RingGeometry,
 };
 
@@ -14,7 +15,7 @@ pub(crate) fn place() {
     static DETECTOR: ConstStaticCell<PlaceDetector<16>> = ConstStaticCell::new(PlaceDetector::new());
     let Some(detector) = DETECTOR.try_take() else { return };
     if let Err(error) = detector.start(PlaceConfig::default().opaque(), RingGeometry::even().opaque()) {
-        show::<PlaceConfigError>(error);
+        show::<ConfigError>(error);
     }
     for _ in 0..black_box(9) {
         black_box(detector.observe(&any_frame()));

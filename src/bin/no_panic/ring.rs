@@ -12,9 +12,9 @@ use static_cell::ConstStaticCell;
 use toposlam::{
     FaultCounters, FaultKind,
     ring::drivers::{
-        AddressError, BridgeError, FiringPlan, HcSr04Config, HcSr04ConfigError, HcSr04Ring, MaxBotixConfig,
-        MaxBotixConfigError, MaxBotixRing, MicrosecondClock, Sc18im700, SonarError, SonarRing, Srf08Config,
-        Srf08ConfigError, Srf08Ring, change_maxbotix_address, change_srf08_address,
+        AddressError, BridgeError, FiringPlan, HcSr04Config, HcSr04Ring, MaxBotixConfig, MaxBotixRing,
+        MicrosecondClock, Sc18im700, SonarError, SonarRing, Srf08Config, Srf08Ring, change_maxbotix_address,
+        change_srf08_address,
     },
     ring::{Echo, RingFrame},
 };
@@ -166,12 +166,12 @@ fn i2c_rings(mut bus: impl I2c) {
             read(&mut ring);
             ring.release().1.delay_ms(1);
         }
-        Err(error) => show::<Srf08ConfigError>(error),
+        Err(error) => show::<toposlam::ConfigError>(error),
     }
     let config = MaxBotixConfig { plan: any_plan(), ..MaxBotixConfig::default() };
     match MaxBotixRing::<_, _, 16>::new(bus, AnyDelay, config.opaque()) {
         Ok(mut ring) => read(&mut ring),
-        Err(error) => show::<MaxBotixConfigError>(error),
+        Err(error) => show::<toposlam::ConfigError>(error),
     }
 }
 
@@ -183,7 +183,7 @@ fn pin_ring() {
             read(&mut ring);
             ring.release().2.delay_ms(1);
         }
-        Err(error) => show::<HcSr04ConfigError>(error),
+        Err(error) => show::<toposlam::ConfigError>(error),
     }
 }
 

@@ -6,12 +6,11 @@ use core::hint::black_box;
 use embedded_hal::{digital, pwm};
 use static_cell::ConstStaticCell;
 use toposlam::drive::{
-    DifferentialDrive, Drive, DriveConfig, DriveConfigError, Goal, MotorError, VelocityCommand, WheelSpeeds,
-    WheelsConfig, WheelsConfigError,
+    DifferentialDrive, Drive, DriveConfig, Goal, MotorError, VelocityCommand, WheelSpeeds, WheelsConfig,
 };
 use toposlam::persist::snapshot::{Resume, SnapshotError};
 use toposlam::reference::{self, HISTORY, ReferenceRobot, SNAPSHOT_BYTES, VERTICES};
-use toposlam::robot::{Board, RobotError, SaveError};
+use toposlam::robot::{Board, SaveError};
 use toposlam::wire::QueueFull;
 use toposlam::{FaultCounters, VertexId};
 
@@ -95,12 +94,12 @@ pub(crate) fn drive() {
             }
             black_box(wheels.release().len());
         }
-        Err(error) => show::<WheelsConfigError>(error),
+        Err(error) => show::<toposlam::ConfigError>(error),
     }
     static DRIVE: ConstStaticCell<Drive<VERTICES, HISTORY>> = ConstStaticCell::new(Drive::new());
     let Some(drive) = DRIVE.try_take() else { return };
     if let Err(error) = drive.start(DriveConfig::DEFAULT.opaque(), black_box(1)).and(drive.set_speed(black_box(3))) {
-        show::<DriveConfigError>(error);
+        show::<toposlam::ConfigError>(error);
     }
     drive.set_goal(Goal::Vertex(VertexId::FIRST).opaque());
     drive.kidnapped();
@@ -112,7 +111,7 @@ pub(crate) fn robot() {
     static BUFFER: ConstStaticCell<[u8; SNAPSHOT_BYTES]> = ConstStaticCell::new([0; SNAPSHOT_BYTES]);
     let (Some(robot), Some(buffer)) = (ROBOT.try_take(), BUFFER.try_take()) else { return };
     if let Err(error) = robot.start(&reference::ROBOT.opaque(), buffer) {
-        show::<RobotError>(error);
+        show::<toposlam::ConfigError>(error);
     }
     for _ in 0..black_box(9) {
         black_box(robot.turn(&any_frame(), &FaultCounters::new().opaque(), &mut Any));

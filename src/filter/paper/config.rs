@@ -1,7 +1,6 @@
 //! The parameters of the paper's filter.
 
-use crate::filter::ConfigError;
-use crate::{Direction, NgramLength};
+use crate::{ConfigError, Direction, NgramLength};
 
 /// The parameters of the paper's filter. The defaults are the paper's where it gives them.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -53,15 +52,18 @@ impl Config {
     /// # Errors
     /// [`ConfigError`] names the first field that is out of its range.
     pub fn check(&self, capacity: usize) -> Result<NgramLength, ConfigError> {
-        let length = NgramLength::new(self.ngram_length).map_err(|_| ConfigError("ngram_length"))?;
-        let sigmas = 1..=8188;
-        match () {
-            () if self.particles == 0 || usize::from(self.particles) > capacity => Err(ConfigError("particles")),
-            () if self.penalty_permille > 999 => Err(ConfigError("penalty_permille")),
-            () if !sigmas.contains(&self.sigma_label_mm) => Err(ConfigError("sigma_label_mm")),
-            () if !sigmas.contains(&self.sigma_consistency_mm) => Err(ConfigError("sigma_consistency_mm")),
-            () => Ok(length),
-        }
+        let value = self.ngram_length.into();
+        let length = NgramLength::new(self.ngram_length).map_err(|_| ConfigError::OutOfRange {
+            field: "ngram_length",
+            value,
+            min: 2,
+            max: 7,
+        })?;
+        ConfigError::check("particles", self.particles.into(), 1, capacity as i32)?;
+        ConfigError::check("penalty_permille", self.penalty_permille.into(), 0, 999)?;
+        ConfigError::check("sigma_label_mm", self.sigma_label_mm.into(), 1, 8188)?;
+        ConfigError::check("sigma_consistency_mm", self.sigma_consistency_mm.into(), 1, 8188)?;
+        Ok(length)
     }
 }
 
@@ -86,7 +88,7 @@ mod tests {
             (Config { sigma_label_mm: 0, ..default }, "sigma_label_mm"),
             (Config { sigma_consistency_mm: 8189, ..default }, "sigma_consistency_mm"),
         ] {
-            assert_eq!(config.check(10), Err(ConfigError(field)));
+            assert_eq!(config.check(10).unwrap_err().field(), field);
         }
     }
 }

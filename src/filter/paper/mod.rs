@@ -18,8 +18,8 @@ pub use ngram::{Ngram, NgramError, NgramLength, NgramTable, NgramsFull};
 pub use particle::Particle;
 pub use prior::Prior;
 
-use super::{ConfigError, Update, WeightFactors, draws};
-use crate::{FaultCounters, FaultKind, Fingerprint, Map};
+use super::{Update, WeightFactors, draws};
+use crate::{ConfigError, FaultCounters, FaultKind, Fingerprint, Map};
 use particles::{Particles, Step};
 use rand_core::Rng;
 

@@ -1,6 +1,6 @@
 //! The parameters of the robust filter.
 
-use crate::filter::ConfigError;
+use crate::ConfigError;
 
 /// The parameters of the robust filter. The defaults were chosen on random families of environments (docs/evaluation.md).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -47,14 +47,11 @@ impl RobustConfig {
     /// # Errors
     /// [`ConfigError`] names the first field that is out of its range.
     pub fn check(&self, capacity: usize) -> Result<(), ConfigError> {
-        match () {
-            () if self.hypotheses == 0 || usize::from(self.hypotheses) > capacity => Err(ConfigError("hypotheses")),
-            () if !(1..=1000).contains(&self.noise_mm) => Err(ConfigError("noise_mm")),
-            () if !(1..=1000).contains(&self.resolution_mm) => Err(ConfigError("resolution_mm")),
-            () if !(1..=500).contains(&self.wrong_turn_permille) => Err(ConfigError("wrong_turn_permille")),
-            () if !(1..=500).contains(&self.wrong_degree_permille) => Err(ConfigError("wrong_degree_permille")),
-            () => Ok(()),
-        }
+        ConfigError::check("hypotheses", self.hypotheses.into(), 1, capacity as i32)?;
+        ConfigError::check("noise_mm", self.noise_mm.into(), 1, 1000)?;
+        ConfigError::check("resolution_mm", self.resolution_mm.into(), 1, 1000)?;
+        ConfigError::check("wrong_turn_permille", self.wrong_turn_permille.into(), 1, 500)?;
+        ConfigError::check("wrong_degree_permille", self.wrong_degree_permille.into(), 1, 500)
     }
 }
 

@@ -30,8 +30,8 @@ mod worst;
 pub use config::RobustConfig;
 pub(super) use worst::LENGTH as NGRAM_LENGTH;
 
-use super::{ConfigError, Update, WorstNgram, draws};
-use crate::{FaultCounters, FaultKind, Fingerprint, Map, Observation, VertexId};
+use super::{Update, WorstNgram, draws};
+use crate::{ConfigError, FaultCounters, FaultKind, Fingerprint, Map, Observation, VertexId};
 use beam::Beam;
 use decode::Decoder;
 use forward::Forward;

@@ -5,8 +5,6 @@
 //! echo it falls after about 38 ms; some clones take longer, and some hold the line high permanently. Two measurements are
 //! at least 60 ms apart, so that the sound decays.
 
-use core::fmt;
-
 use embedded_hal::{
     delay::DelayNs,
     digital::{InputPin, OutputPin},
@@ -15,10 +13,10 @@ use embedded_hal::{
 use super::{
     FiringPlan, Reading, SonarError, SonarFault, SonarRing,
     reading::Readings,
-    sound::{is_speed_of_sound, range_mm},
+    sound::{check_speed_of_sound, flight_us, range_mm},
 };
 use crate::{
-    FaultCounters,
+    ConfigError, FaultCounters,
     ring::{Echo, RingFrame},
 };
 
@@ -68,24 +66,15 @@ impl<const SONARS: usize> HcSr04Config<SONARS> {
         max_range_mm: 4000,
     };
 
-    fn check(&self) -> Result<(), HcSr04ConfigError> {
-        if self.trigger_us < 10 {
-            return Err(HcSr04ConfigError::Trigger);
-        }
-        if self.stopped_clock_polls == 0 {
-            return Err(HcSr04ConfigError::StoppedClockPolls);
-        }
-        if !is_speed_of_sound(self.speed_of_sound_m_per_s) {
-            return Err(HcSr04ConfigError::SpeedOfSound);
-        }
-        if self.min_range_mm > self.max_range_mm {
-            return Err(HcSr04ConfigError::Range);
-        }
-        let longest_mm = range_mm(self.echo_timeout_us.into(), self.speed_of_sound_m_per_s);
-        if self.rise_timeout_us == 0 || longest_mm < self.max_range_mm.into() {
-            return Err(HcSr04ConfigError::Timeout);
-        }
-        Ok(())
+    fn check(&self) -> Result<(), ConfigError> {
+        let most = u16::MAX.into();
+        ConfigError::check("trigger_us", self.trigger_us.into(), 10, u8::MAX.into())?;
+        ConfigError::check("stopped_clock_polls", self.stopped_clock_polls.into(), 1, most)?;
+        check_speed_of_sound(self.speed_of_sound_m_per_s)?;
+        ConfigError::check("min_range_mm", self.min_range_mm.into(), 0, self.max_range_mm.into())?;
+        ConfigError::check("rise_timeout_us", self.rise_timeout_us.into(), 1, most)?;
+        let flight_us = flight_us(self.max_range_mm, self.speed_of_sound_m_per_s);
+        ConfigError::check("echo_timeout_us", self.echo_timeout_us.into(), flight_us, most)
     }
 
     /// Converts the width of a pulse to an echo.
@@ -119,36 +108,6 @@ impl<const SONARS: usize> Default for HcSr04Config<SONARS> {
         Self::DEFAULT
     }
 }
-
-/// Which field of an [`HcSr04Config`] cannot be.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[non_exhaustive]
-pub enum HcSr04ConfigError {
-    /// `trigger_us`: less than 10.
-    Trigger,
-    /// `rise_timeout_us` is 0, or `echo_timeout_us` is shorter than an echo from `max_range_mm`.
-    Timeout,
-    /// `stopped_clock_polls`: 0.
-    StoppedClockPolls,
-    /// `speed_of_sound_m_per_s`: outside 300 to 400.
-    SpeedOfSound,
-    /// `min_range_mm` is above `max_range_mm`.
-    Range,
-}
-
-impl fmt::Display for HcSr04ConfigError {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(match self {
-            Self::Trigger => "trigger_us: must be 10 or more",
-            Self::Timeout => "rise_timeout_us: must not be 0; echo_timeout_us: must leave time for max_range_mm",
-            Self::StoppedClockPolls => "stopped_clock_polls: must not be 0",
-            Self::SpeedOfSound => "speed_of_sound_m_per_s: must be from 300 to 400",
-            Self::Range => "min_range_mm: must not be above max_range_mm",
-        })
-    }
-}
-
-impl core::error::Error for HcSr04ConfigError {}
 
 /// A ring of `SONARS` HC-SR04. The sensors of a group may share a trigger line; each then has a handle to the same pin.
 ///
@@ -186,7 +145,7 @@ impl<TRIGGER: OutputPin, ECHO: InputPin, CLOCK: MicrosecondClock, DELAY: DelayNs
         clock: CLOCK,
         delay: DELAY,
         config: HcSr04Config<SONARS>,
-    ) -> Result<Self, HcSr04ConfigError> {
+    ) -> Result<Self, ConfigError> {
         config.check()?;
         Ok(Self { pins, clock, delay, config, fired_us: None, last_error: None })
     }
@@ -307,15 +266,15 @@ mod tests {
         let good = HcSr04Config::<16>::DEFAULT;
         assert_eq!(good.check(), Ok(()));
         let wrong = [
-            (HcSr04Config { trigger_us: 9, ..good }, HcSr04ConfigError::Trigger),
-            (HcSr04Config { rise_timeout_us: 0, ..good }, HcSr04ConfigError::Timeout),
-            (HcSr04Config { echo_timeout_us: 23_000, ..good }, HcSr04ConfigError::Timeout),
-            (HcSr04Config { stopped_clock_polls: 0, ..good }, HcSr04ConfigError::StoppedClockPolls),
-            (HcSr04Config { speed_of_sound_m_per_s: 401, ..good }, HcSr04ConfigError::SpeedOfSound),
-            (HcSr04Config { min_range_mm: 4001, ..good }, HcSr04ConfigError::Range),
+            (HcSr04Config { trigger_us: 9, ..good }, "trigger_us"),
+            (HcSr04Config { rise_timeout_us: 0, ..good }, "rise_timeout_us"),
+            (HcSr04Config { echo_timeout_us: 23_000, ..good }, "echo_timeout_us"),
+            (HcSr04Config { stopped_clock_polls: 0, ..good }, "stopped_clock_polls"),
+            (HcSr04Config { speed_of_sound_m_per_s: 401, ..good }, "speed_of_sound_m_per_s"),
+            (HcSr04Config { min_range_mm: 4001, ..good }, "min_range_mm"),
         ];
-        for (config, error) in wrong {
-            assert_eq!(config.check(), Err(error));
+        for (config, field) in wrong {
+            assert_eq!(config.check().unwrap_err().field(), field);
         }
     }
 }

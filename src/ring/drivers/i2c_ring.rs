@@ -6,21 +6,18 @@ use embedded_hal::{
 };
 
 use super::{FiringPlan, Reading, SonarError, SonarFault, SonarRing, reading::Readings};
-use crate::{FaultCounters, ring::RingFrame};
+use crate::{ConfigError, FaultCounters, ring::RingFrame};
 
 /// A kind of ranger on an I2C bus: one message starts a measurement, another polls for its result.
 ///
 /// [`Srf08Config`](super::Srf08Config) and [`MaxBotixConfig`](super::MaxBotixConfig) implement it. A new kind of ranger
 /// implements it and uses [`I2cRing`].
 pub trait I2cRanger<const SONARS: usize> {
-    /// Names the setting that is out of its range.
-    type ConfigError;
-
     /// Checks the settings, once, before the first frame.
     ///
     /// # Errors
     /// The first setting that is out of its range.
-    fn check(&self) -> Result<(), Self::ConfigError>;
+    fn check(&self) -> Result<(), ConfigError>;
 
     /// 7-bit address of sensor 0. Sensor *i* has this address plus *i*.
     fn first_address(&self) -> u8;
@@ -80,7 +77,7 @@ impl<BUS: I2c, DELAY: DelayNs, RANGER: I2cRanger<SONARS>, const SONARS: usize> I
     ///
     /// # Errors
     /// The first setting that is out of its range.
-    pub fn new(bus: BUS, delay: DELAY, config: RANGER) -> Result<Self, RANGER::ConfigError> {
+    pub fn new(bus: BUS, delay: DELAY, config: RANGER) -> Result<Self, ConfigError> {
         config.check()?;
         Ok(Self { bus, delay, ranger: config, last_error: None })
     }
@@ -170,6 +167,11 @@ impl<BUS: I2c, DELAY: DelayNs, RANGER: I2cRanger<SONARS>, const SONARS: usize> S
 }
 
 /// Whether `sonars` consecutive addresses from `first` are within a range.
-pub(super) fn addresses_fit(first: u8, sonars: usize, within: core::ops::RangeInclusive<u8>) -> bool {
-    within.contains(&first) && usize::from(first) + sonars <= usize::from(*within.end()) + 1
+pub(super) fn check_addresses(
+    first: u8,
+    sonars: usize,
+    within: core::ops::RangeInclusive<u8>,
+) -> Result<(), ConfigError> {
+    let last_first = i32::from(*within.end()) + 1 - sonars as i32;
+    ConfigError::check("first_address", first.into(), (*within.start()).into(), last_first)
 }

@@ -4,12 +4,10 @@
 //! does not acknowledge its address. About 80 ms later a read returns two bytes, the range in centimetres, high byte first:
 //! 20 to 765, where 765 means no echo. Two measurements are at least 100 ms apart, so that the sound decays.
 
-use core::fmt;
-
 use embedded_hal::i2c::I2c;
 
-use super::{FiringPlan, I2cRanger, I2cRing, RangingTiming, Reading, SonarFault, i2c_ring::addresses_fit};
-use crate::ring::Echo;
+use super::{FiringPlan, I2cRanger, I2cRing, RangingTiming, Reading, SonarFault, i2c_ring::check_addresses};
+use crate::{ConfigError, ring::Echo};
 
 const START_MEASUREMENT: u8 = 81;
 const MIN_RANGE_CM: u16 = 20;
@@ -58,17 +56,13 @@ fn echo(range_cm: u16) -> Result<Echo, SonarFault> {
 }
 
 impl<const SONARS: usize> I2cRanger<SONARS> for MaxBotixConfig<SONARS> {
-    type ConfigError = MaxBotixConfigError;
-
-    fn check(&self) -> Result<(), MaxBotixConfigError> {
+    fn check(&self) -> Result<(), ConfigError> {
+        check_addresses(self.first_address, SONARS, 0x08..=0x7F)?;
         let mut addresses = (self.first_address..=u8::MAX).take(SONARS);
-        if !addresses_fit(self.first_address, SONARS, 0x08..=0x7F) || !addresses.all(is_address) {
-            return Err(MaxBotixConfigError::FirstAddress);
+        if let Some(address) = addresses.find(|&address| !is_address(address)) {
+            return Err(ConfigError::ReservedAddress { field: "first_address", address });
         }
-        if self.ranging_ms == 0 || self.ranging_ms > self.cycle_ms {
-            return Err(MaxBotixConfigError::Ranging);
-        }
-        Ok(())
+        ConfigError::check("ranging_ms", self.ranging_ms.into(), 1, self.cycle_ms.into())
     }
 
     fn first_address(&self) -> u8 {
@@ -95,27 +89,6 @@ impl<const SONARS: usize> I2cRanger<SONARS> for MaxBotixConfig<SONARS> {
         Ok(Reading::Done(echo(u16::from_be_bytes(range_cm))))
     }
 }
-
-/// Which field of a [`MaxBotixConfig`] cannot be.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[non_exhaustive]
-pub enum MaxBotixConfigError {
-    /// `first_address`: not every sensor of the ring gets an address that it can have.
-    FirstAddress,
-    /// `ranging_ms`: 0, or longer than `cycle_ms`.
-    Ranging,
-}
-
-impl fmt::Display for MaxBotixConfigError {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(match self {
-            Self::FirstAddress => "first_address: sensors need addresses from 0x08 to 0x7F but 0x28, 0x52 and 0x55",
-            Self::Ranging => "ranging_ms: must be from 1 to cycle_ms",
-        })
-    }
-}
-
-impl core::error::Error for MaxBotixConfigError {}
 
 /// A ring of `SONARS` I2CXL-MaxSonar at consecutive addresses of one I2C bus.
 ///
@@ -149,11 +122,11 @@ mod tests {
         }
         for first_address in [0x00, 0x07, 0x19, 0x28, 0x43, 0x52, 0x53, 0x54, 0x55, 0x71, 0x80, 0xFF] {
             let config = MaxBotixConfig { first_address, ..good };
-            assert_eq!(config.check(), Err(MaxBotixConfigError::FirstAddress), "{first_address:#x}");
+            assert_eq!(config.check().unwrap_err().field(), "first_address", "{first_address:#x}");
         }
         for (ranging_ms, cycle_ms) in [(0, 100), (101, 100)] {
             let config = MaxBotixConfig { ranging_ms, cycle_ms, ..good };
-            assert_eq!(config.check(), Err(MaxBotixConfigError::Ranging));
+            assert_eq!(config.check().unwrap_err().field(), "ranging_ms");
         }
     }
 }

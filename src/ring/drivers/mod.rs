@@ -77,12 +77,12 @@ mod srf08;
 
 pub use address::{AddressError, change_maxbotix_address, change_srf08_address};
 pub use firing::FiringPlan;
-pub use hcsr04::{HcSr04Config, HcSr04ConfigError, HcSr04Ring, MicrosecondClock};
+pub use hcsr04::{HcSr04Config, HcSr04Ring, MicrosecondClock};
 pub use i2c_ring::{I2cRanger, I2cRing, RangingTiming};
-pub use maxbotix::{MaxBotixConfig, MaxBotixConfigError, MaxBotixRing};
+pub use maxbotix::{MaxBotixConfig, MaxBotixRing};
 pub use reading::Reading;
 pub use sc18im700::{BridgeError, Sc18im700};
-pub use srf08::{Srf08Config, Srf08ConfigError, Srf08Ring};
+pub use srf08::{Srf08Config, Srf08Ring};
 
 /// A ring of `SONARS` range sensors.
 pub trait SonarRing<const SONARS: usize> {

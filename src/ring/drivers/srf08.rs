@@ -5,16 +5,16 @@
 //! drive the bus, so the revision reads as 255. Register 1 is the light sensor (the SRF10 has none). Registers 2 and 3 are
 //! the first echo, high byte first, 0 without an echo. A command to address 0 starts every SRF08 on the bus.
 
-use core::{fmt, ops::RangeInclusive};
+use core::ops::RangeInclusive;
 
 use embedded_hal::i2c::I2c;
 
 use super::{
     FiringPlan, I2cRanger, I2cRing, RangingTiming, Reading, SonarFault,
-    i2c_ring::addresses_fit,
-    sound::{is_speed_of_sound, range_mm},
+    i2c_ring::check_addresses,
+    sound::{check_speed_of_sound, range_mm},
 };
-use crate::ring::Echo;
+use crate::{ConfigError, ring::Echo};
 
 /// All SRF08 on the bus listen to this address.
 const GENERAL_CALL: u8 = 0;
@@ -82,25 +82,13 @@ impl<const SONARS: usize> Default for Srf08Config<SONARS> {
 }
 
 impl<const SONARS: usize> I2cRanger<SONARS> for Srf08Config<SONARS> {
-    type ConfigError = Srf08ConfigError;
-
-    fn check(&self) -> Result<(), Srf08ConfigError> {
-        if !addresses_fit(self.first_address, SONARS, ADDRESSES) {
-            return Err(Srf08ConfigError::FirstAddress);
-        }
-        if self.timeout_ms == 0 {
-            return Err(Srf08ConfigError::Timeout);
-        }
-        if self.poll_interval_us == 0 {
-            return Err(Srf08ConfigError::PollInterval);
-        }
-        if !is_speed_of_sound(self.speed_of_sound_m_per_s) {
-            return Err(Srf08ConfigError::SpeedOfSound);
-        }
-        if self.min_range_mm > self.max_range_mm {
-            return Err(Srf08ConfigError::Range);
-        }
-        Ok(())
+    fn check(&self) -> Result<(), ConfigError> {
+        let most = u16::MAX.into();
+        check_addresses(self.first_address, SONARS, ADDRESSES)?;
+        ConfigError::check("timeout_ms", self.timeout_ms.into(), 1, most)?;
+        ConfigError::check("poll_interval_us", self.poll_interval_us.into(), 1, most)?;
+        check_speed_of_sound(self.speed_of_sound_m_per_s)?;
+        ConfigError::check("min_range_mm", self.min_range_mm.into(), 0, self.max_range_mm.into())
     }
 
     fn first_address(&self) -> u8 {
@@ -138,36 +126,6 @@ impl<const SONARS: usize> I2cRanger<SONARS> for Srf08Config<SONARS> {
     }
 }
 
-/// Which field of a [`Srf08Config`] cannot be.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[non_exhaustive]
-pub enum Srf08ConfigError {
-    /// `first_address`: not every sensor of the ring gets an address from 0x70 to 0x7F.
-    FirstAddress,
-    /// `timeout_ms`: 0.
-    Timeout,
-    /// `poll_interval_us`: 0.
-    PollInterval,
-    /// `speed_of_sound_m_per_s`: outside 300 to 400.
-    SpeedOfSound,
-    /// `min_range_mm` is above `max_range_mm`.
-    Range,
-}
-
-impl fmt::Display for Srf08ConfigError {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(match self {
-            Self::FirstAddress => "first_address: sensors need addresses from 0x70 to 0x7F",
-            Self::Timeout => "timeout_ms: must not be 0",
-            Self::PollInterval => "poll_interval_us: must not be 0",
-            Self::SpeedOfSound => "speed_of_sound_m_per_s: must be from 300 to 400",
-            Self::Range => "min_range_mm: must not be above max_range_mm",
-        })
-    }
-}
-
-impl core::error::Error for Srf08ConfigError {}
-
 /// A ring of `SONARS` SRF08 or SRF10 at consecutive addresses of one I2C bus, at most 16.
 ///
 /// A frame takes one measurement (65 ms by the data sheet) for each firing group, and waits at most `timeout_ms` for each.
@@ -200,15 +158,15 @@ mod tests {
         let good = Srf08Config::<16>::DEFAULT;
         assert_eq!(good.check(), Ok(()));
         let wrong = [
-            (Srf08Config { first_address: 0x6F, ..good }, Srf08ConfigError::FirstAddress),
-            (Srf08Config { first_address: 0x71, ..good }, Srf08ConfigError::FirstAddress),
-            (Srf08Config { timeout_ms: 0, ..good }, Srf08ConfigError::Timeout),
-            (Srf08Config { poll_interval_us: 0, ..good }, Srf08ConfigError::PollInterval),
-            (Srf08Config { speed_of_sound_m_per_s: 299, ..good }, Srf08ConfigError::SpeedOfSound),
-            (Srf08Config { min_range_mm: 6001, ..good }, Srf08ConfigError::Range),
+            (Srf08Config { first_address: 0x6F, ..good }, "first_address"),
+            (Srf08Config { first_address: 0x71, ..good }, "first_address"),
+            (Srf08Config { timeout_ms: 0, ..good }, "timeout_ms"),
+            (Srf08Config { poll_interval_us: 0, ..good }, "poll_interval_us"),
+            (Srf08Config { speed_of_sound_m_per_s: 299, ..good }, "speed_of_sound_m_per_s"),
+            (Srf08Config { min_range_mm: 6001, ..good }, "min_range_mm"),
         ];
-        for (config, error) in wrong {
-            assert_eq!(config.check(), Err(error));
+        for (config, field) in wrong {
+            assert_eq!(config.check().unwrap_err().field(), field);
         }
     }
 }

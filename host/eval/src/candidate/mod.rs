@@ -58,7 +58,9 @@ pub fn choose(settings: &Settings, explored: usize) -> Result<Start, EvaluationE
             config.check(MAX_HYPOTHESES).map_err(EvaluationError::Config)?;
             // What is judged and what the filter uses are n-grams of one length.
             if NgramLength::new(config.ngram_length) != Ok(length) {
-                return Err(EvaluationError::Config(ConfigError("ngram_length")));
+                let (value, wanted) = (config.ngram_length.into(), length.get() as i32);
+                let error = ConfigError::OutOfRange { field: "ngram_length", value, min: wanted, max: wanted };
+                return Err(EvaluationError::Config(error));
             }
             paper::choose(config.particles.into(), settings, ngrams)
         }
