@@ -3,7 +3,7 @@
 mod interface;
 mod observation;
 mod paper;
-mod robust;
+pub(crate) mod robust;
 
 pub use interface::{Filter, FilterCapacities};
 pub use observation::{Observation, Turn};

@@ -4,6 +4,7 @@
 
 mod drive;
 mod mapper;
+mod robust_filter;
 pub mod snapshot;
 #[cfg(feature = "store")]
 pub mod store;

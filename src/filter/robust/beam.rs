@@ -22,7 +22,7 @@ const NONE: Candidate = Candidate { score: f32::NEG_INFINITY, gain: 0.0, key: 0,
 
 /// Up to `N` hypotheses of which no two have the same map and place.
 #[derive(Clone, Debug)]
-pub(super) struct Beam<const N: usize, const V: usize, const T: usize> {
+pub(crate) struct Beam<const N: usize, const V: usize, const T: usize> {
     slots: [Hypothesis<V, T>; N],
     /// The slots of the hypotheses, the best first; behind `len` the free ones.
     order: [u8; N],
@@ -30,12 +30,12 @@ pub(super) struct Beam<const N: usize, const V: usize, const T: usize> {
 }
 
 impl<const N: usize, const V: usize, const T: usize> Beam<N, V, T> {
-    pub(super) const fn new() -> Self {
+    pub(crate) const fn new() -> Self {
         Self { slots: [Hypothesis::NONE; N], order: [0; N], len: 0 }
     }
 
     /// Begins with the hypothesis that knows nothing.
-    pub(super) fn clear(&mut self) {
+    pub(crate) fn clear(&mut self) {
         for (number, slot) in (0..).zip(&mut self.order) {
             *slot = number;
         }
@@ -46,7 +46,7 @@ impl<const N: usize, const V: usize, const T: usize> Beam<N, V, T> {
     }
 
     /// Begins with one hypothesis.
-    pub(super) fn begin_with(&mut self, hypothesis: &Hypothesis<V, T>) {
+    pub(crate) fn begin_with(&mut self, hypothesis: &Hypothesis<V, T>) {
         self.clear();
         if let Some(first) = self.slots.first_mut() {
             first.clone_from(hypothesis);
@@ -55,14 +55,14 @@ impl<const N: usize, const V: usize, const T: usize> Beam<N, V, T> {
 
     /// Begins with no hypothesis, for those that are [appended](Beam::append).
     #[cfg(feature = "snapshot")]
-    pub(super) fn begin_empty(&mut self) {
+    pub(crate) fn begin_empty(&mut self) {
         self.clear();
         self.len = 0;
     }
 
     /// Puts a hypothesis behind the others; one with the map and place of another, or without room, is left out.
     #[cfg(feature = "snapshot")]
-    pub(super) fn append(&mut self, hypothesis: &Hypothesis<V, T>) {
+    pub(crate) fn append(&mut self, hypothesis: &Hypothesis<V, T>) {
         let key = hypothesis.key();
         if self.len < N && self.iter().all(|held| held.key() != key) {
             self.len += 1;
@@ -72,25 +72,25 @@ impl<const N: usize, const V: usize, const T: usize> Beam<N, V, T> {
         }
     }
 
-    pub(super) fn len(&self) -> usize {
+    pub(crate) fn len(&self) -> usize {
         self.len
     }
 
-    pub(super) fn get(&self, rank: usize) -> Option<&Hypothesis<V, T>> {
+    pub(crate) fn get(&self, rank: usize) -> Option<&Hypothesis<V, T>> {
         let slot = self.order.get(..self.len)?.get(rank)?;
         self.slots.get(usize::from(*slot))
     }
 
-    pub(super) fn get_mut(&mut self, rank: usize) -> Option<&mut Hypothesis<V, T>> {
+    pub(crate) fn get_mut(&mut self, rank: usize) -> Option<&mut Hypothesis<V, T>> {
         let slot = self.order.get(..self.len)?.get(rank)?;
         self.slots.get_mut(usize::from(*slot))
     }
 
-    pub(super) fn iter(&self) -> impl Iterator<Item = &Hypothesis<V, T>> {
+    pub(crate) fn iter(&self) -> impl Iterator<Item = &Hypothesis<V, T>> {
         self.order.iter().take(self.len).filter_map(|&slot| self.slots.get(usize::from(slot)))
     }
 
-    pub(super) fn each(&mut self, mut change: impl FnMut(&mut Hypothesis<V, T>)) {
+    pub(crate) fn each(&mut self, mut change: impl FnMut(&mut Hypothesis<V, T>)) {
         for &slot in self.order.iter().take(self.len) {
             if let Some(hypothesis) = self.slots.get_mut(usize::from(slot)) {
                 change(hypothesis);
@@ -99,19 +99,19 @@ impl<const N: usize, const V: usize, const T: usize> Beam<N, V, T> {
     }
 
     /// Forgets all hypotheses but the best one.
-    pub(super) fn keep_best(&mut self) {
+    pub(crate) fn keep_best(&mut self) {
         self.len = self.len.min(1);
     }
 
     /// The score that a new hypothesis has to exceed.
-    pub(super) fn threshold(&self, wanted: usize) -> f32 {
+    pub(crate) fn threshold(&self, wanted: usize) -> f32 {
         let worst = self.get(self.len.saturating_sub(1)).filter(|_| self.len >= wanted.min(N));
         let best = self.get(0).map_or(f32::NEG_INFINITY, Hypothesis::score);
         worst.map_or(best - UNLIKELY, Hypothesis::score)
     }
 
     /// Restores the order by score.
-    pub(super) fn sort(&mut self) {
+    pub(crate) fn sort(&mut self) {
         let Self { slots, order, len } = self;
         let score = |slot: u8| slots.get(usize::from(slot)).map_or(f32::NEG_INFINITY, Hypothesis::score);
         for end in 1..*len {
@@ -129,7 +129,7 @@ impl<const N: usize, const V: usize, const T: usize> Beam<N, V, T> {
     /// Takes the newest observation, number `index` of the record: of all predictions of all hypotheses the best `wanted`
     /// distinct ones live on. When the map is `fixed` they differ in the place alone. Tells whether the best hypothesis
     /// would have had another vertex if there had been room. Cost: O(N · V) predictions.
-    pub(super) fn grow(
+    pub(crate) fn grow(
         &mut self,
         prices: &Prices,
         record: &Record<T>,
@@ -207,7 +207,7 @@ impl<const N: usize, const V: usize, const T: usize> Beam<N, V, T> {
 
     /// Takes in a hypothesis: in place of the one with the same map and place if it is better than that, else in a free
     /// slot, else in place of the worst. Tells whether it was taken.
-    pub(super) fn insert(&mut self, hypothesis: &Hypothesis<V, T>, wanted: usize) -> bool {
+    pub(crate) fn insert(&mut self, hypothesis: &Hypothesis<V, T>, wanted: usize) -> bool {
         let key = hypothesis.key();
         let rank = self.iter().position(|held| held.key() == key);
         let has_room = rank.is_none() && self.len < wanted.min(N);

@@ -7,42 +7,42 @@ use crate::Map;
 use crate::map::bits;
 
 /// No vertex: before the first place, or where the robot's way is not known.
-pub(super) const NOWHERE: u8 = u8::MAX;
+pub(crate) const NOWHERE: u8 = u8::MAX;
 
 /// The price of a path that stays at one vertex for two places: such a path is never kept.
 const STANDSTILL: f32 = 1e6;
 
 /// A partition of the newest `T` observations, and of all that came before them, into at most `V` vertices.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Hypothesis<const V: usize, const T: usize> {
-    pub(super) vertices: u8,
+pub(crate) struct Hypothesis<const V: usize, const T: usize> {
+    pub(crate) vertices: u8,
     /// The vertex of the newest observation.
-    pub(super) place: u8,
+    pub(crate) place: u8,
     /// The vertex of the place before the oldest observation of the record; [`NOWHERE`] when there is none.
-    pub(super) before: u8,
+    pub(crate) before: u8,
     /// How many sequences begin in the record.
-    pub(super) starts: u16,
+    pub(crate) starts: u16,
     /// ln P of all turn hints.
-    pub(super) hints: f32,
+    pub(crate) hints: f32,
     /// The collapsed evidence of map and path.
-    pub(super) evidence: f32,
+    pub(crate) evidence: f32,
     /// By how much the evidence of the map, all its paths together, exceeds that of this one path, as last computed.
-    pub(super) surplus: f32,
+    pub(crate) surplus: f32,
     /// Evidence of counts that have faded.
-    pub(super) faded: f32,
+    pub(crate) faded: f32,
     /// Identifies the map; vertices are numbered in the order of their first visit.
-    pub(super) map_key: u32,
-    pub(super) path: [u8; T],
-    pub(super) tallies: [Tally; V],
+    pub(crate) map_key: u32,
+    pub(crate) path: [u8; T],
+    pub(crate) tallies: [Tally; V],
     /// What left the record.
-    pub(super) settled: [Tally; V],
-    pub(super) neighbours: [u32; V],
+    pub(crate) settled: [Tally; V],
+    pub(crate) neighbours: [u32; V],
     /// Edges that were driven before the record begins.
-    pub(super) settled_neighbours: [u32; V],
+    pub(crate) settled_neighbours: [u32; V],
 }
 
 impl<const V: usize, const T: usize> Hypothesis<V, T> {
-    pub(super) const NONE: Self = Self {
+    pub(crate) const NONE: Self = Self {
         vertices: 0,
         place: 0,
         before: 0,
@@ -59,7 +59,7 @@ impl<const V: usize, const T: usize> Hypothesis<V, T> {
         settled_neighbours: [0; V],
     };
 
-    pub(super) fn clear(&mut self) {
+    pub(crate) fn clear(&mut self) {
         self.vertices = 0;
         self.place = NOWHERE;
         self.before = NOWHERE;
@@ -76,46 +76,46 @@ impl<const V: usize, const T: usize> Hypothesis<V, T> {
     }
 
     /// What hypotheses are ranked by.
-    pub(super) fn score(&self) -> f32 {
+    pub(crate) fn score(&self) -> f32 {
         self.evidence + self.surplus
     }
 
-    pub(super) fn key(&self) -> u32 {
+    pub(crate) fn key(&self) -> u32 {
         keyed(self.map_key, self.vertices, self.place)
     }
 
-    pub(super) fn tally(&self, vertex: u8) -> Tally {
+    pub(crate) fn tally(&self, vertex: u8) -> Tally {
         self.tallies.get(usize::from(vertex)).copied().unwrap_or(Tally::NONE)
     }
 
-    pub(super) fn row(&self, vertex: u8) -> u32 {
+    pub(crate) fn row(&self, vertex: u8) -> u32 {
         self.neighbours.get(usize::from(vertex)).copied().unwrap_or(0)
     }
 
-    pub(super) fn degree(&self, vertex: u8) -> u32 {
+    pub(crate) fn degree(&self, vertex: u8) -> u32 {
         self.row(vertex).count_ones()
     }
 
-    pub(super) fn at(&self, index: usize) -> u8 {
+    pub(crate) fn at(&self, index: usize) -> u8 {
         self.path.get(index).copied().unwrap_or(NOWHERE)
     }
 
-    pub(super) fn edges(&self) -> u32 {
+    pub(crate) fn edges(&self) -> u32 {
         let rows = self.neighbours.iter().take(usize::from(self.vertices));
         rows.map(|row| row.count_ones()).sum::<u32>() / 2
     }
 
-    pub(super) fn is_edge(&self, a: u8, b: u8) -> bool {
+    pub(crate) fn is_edge(&self, a: u8, b: u8) -> bool {
         self.row(a) >> (b & 31) & 1 == 1
     }
 
     /// Identifies the map, wherever the robot is.
-    pub(super) fn map_alone_key(&self) -> u32 {
+    pub(crate) fn map_alone_key(&self) -> u32 {
         keyed(self.map_key, self.vertices, 0)
     }
 
     /// A hypothesis that knows a map and has seen nothing yet.
-    pub(super) fn know(&mut self, map: &Map<V>, deviation_steps: f32) {
+    pub(crate) fn know(&mut self, map: &Map<V>, deviation_steps: f32) {
         self.clear();
         self.vertices = map.vertices().len() as u8;
         for vertex in map.vertices() {
@@ -132,7 +132,7 @@ impl<const V: usize, const T: usize> Hypothesis<V, T> {
 
     /// Takes leave of the oldest observation: its counts stay. Tells whether counts have faded, so that the hypothesis has to
     /// be [rebased](Hypothesis::rebase) when the record has dropped the observation.
-    pub(super) fn settle_oldest(&mut self, record: &Record<T>) -> bool {
+    pub(crate) fn settle_oldest(&mut self, record: &Record<T>) -> bool {
         let (Some(oldest), Some(next)) = (record.get(0), record.get(1)) else { return false };
         let mut has_faded = false;
         let vertex = self.at(0);
@@ -152,7 +152,7 @@ impl<const V: usize, const T: usize> Hypothesis<V, T> {
     }
 
     /// Counts anew what the settled counts say now, with the evidence as it was.
-    pub(super) fn rebase(&mut self, prices: &Prices, record: &Record<T>) {
+    pub(crate) fn rebase(&mut self, prices: &Prices, record: &Record<T>) {
         let before = self.evidence;
         self.recount(prices, record);
         self.faded += before - self.evidence;
@@ -160,24 +160,24 @@ impl<const V: usize, const T: usize> Hypothesis<V, T> {
     }
 
     /// Takes a common amount of faded evidence from a hypothesis, so that sums stay small in long runs.
-    pub(super) fn forget(&mut self, faded: f32) {
+    pub(crate) fn forget(&mut self, faded: f32) {
         self.faded -= faded;
         self.evidence -= faded;
     }
 
-    pub(super) fn faded(&self) -> f32 {
+    pub(crate) fn faded(&self) -> f32 {
         self.faded
     }
 
     /// Counts everything anew from a path that was changed: numbers the vertices by first visit, drops those without
     /// visits, and computes the evidence. Cost: O(T + V).
-    pub(super) fn rebuild(&mut self, prices: &Prices, record: &Record<T>) {
+    pub(crate) fn rebuild(&mut self, prices: &Prices, record: &Record<T>) {
         self.renumber(record.len());
         self.recount(prices, record);
     }
 
     /// As [`Hypothesis::rebuild`], with the numbers as they are.
-    pub(super) fn recount(&mut self, prices: &Prices, record: &Record<T>) {
+    pub(crate) fn recount(&mut self, prices: &Prices, record: &Record<T>) {
         self.tallies = self.settled;
         self.neighbours = self.settled_neighbours;
         self.starts = 0;
@@ -208,7 +208,7 @@ impl<const V: usize, const T: usize> Hypothesis<V, T> {
     }
 
     /// The key of a map with these edges.
-    pub(super) fn key_of_edges(&self) -> u32 {
+    pub(crate) fn key_of_edges(&self) -> u32 {
         let mut key = 0;
         for vertex in 0..self.vertices {
             for neighbour in bits(u64::from(self.row(vertex))).filter(|&neighbour| neighbour > vertex) {
@@ -219,13 +219,13 @@ impl<const V: usize, const T: usize> Hypothesis<V, T> {
     }
 
     /// The evidence from the counts.
-    pub(super) fn total(&self, prices: &Prices) -> f32 {
+    pub(crate) fn total(&self, prices: &Prices) -> f32 {
         self.faded + self.factors(prices).iter().sum::<f32>()
     }
 
     /// The factors of the evidence, but for what has faded: of the labels, of the moves between places, and of the size of
     /// the map.
-    pub(super) fn factors(&self, prices: &Prices) -> [f32; 3] {
+    pub(crate) fn factors(&self, prices: &Prices) -> [f32; 3] {
         let mut labels = 0.0;
         let mut moves = self.hints - f32::from(self.starts) * ln(self.vertices.max(1));
         for (vertex, tally) in (0..self.vertices).zip(&self.tallies) {
@@ -269,16 +269,16 @@ impl<const V: usize, const T: usize> Hypothesis<V, T> {
     }
 
     /// Whether a vertex was only visited in the record, so that it can go without a trace.
-    pub(super) fn is_recent(&self, vertex: u8) -> bool {
+    pub(crate) fn is_recent(&self, vertex: u8) -> bool {
         self.settled.get(usize::from(vertex)).is_some_and(|tally| tally.visits == 0) && self.before != vertex
     }
 
-    pub(super) fn settled_row(&self, vertex: u8) -> u32 {
+    pub(crate) fn settled_row(&self, vertex: u8) -> u32 {
         self.settled_neighbours.get(usize::from(vertex)).copied().unwrap_or(0)
     }
 }
 
-pub(super) fn join(rows: &mut [u32], a: u8, b: u8) {
+pub(crate) fn join(rows: &mut [u32], a: u8, b: u8) {
     for (from, to) in [(a, b), (b, a)] {
         if let Some(row) = rows.get_mut(usize::from(from)) {
             *row |= 1 << (to & 31);
@@ -286,7 +286,7 @@ pub(super) fn join(rows: &mut [u32], a: u8, b: u8) {
     }
 }
 
-pub(super) fn ln(count: u8) -> f32 {
+pub(crate) fn ln(count: u8) -> f32 {
     libm::logf(f32::from(count))
 }
 
@@ -296,10 +296,10 @@ fn mix(value: u32) -> u32 {
     value ^ value >> 16
 }
 
-pub(super) fn edge_key(a: u8, b: u8) -> u32 {
+pub(crate) fn edge_key(a: u8, b: u8) -> u32 {
     mix(0x1_0000 | u32::from(a.min(b)) << 8 | u32::from(a.max(b)))
 }
 
-pub(super) fn keyed(map_key: u32, vertices: u8, place: u8) -> u32 {
+pub(crate) fn keyed(map_key: u32, vertices: u8, place: u8) -> u32 {
     map_key ^ mix(0x2_0000 | u32::from(vertices) << 8 | u32::from(place))
 }

@@ -6,26 +6,24 @@
 //! same map add. A place extends every hypothesis in every way and keeps the best distinct ones; moves then merge, split,
 //! unfold and decode them, because what one place decided wrongly no later place can take back otherwise.
 
-mod beam;
+pub(crate) mod beam;
 mod config;
 mod decode;
 mod forward;
 mod growth;
-mod hypothesis;
+pub(crate) mod hypothesis;
 mod lattice;
 mod merges;
 mod moves;
-mod names;
+pub(crate) mod names;
 mod noise;
-mod prices;
-mod record;
-#[cfg(feature = "snapshot")]
-mod snapshot;
+pub(crate) mod prices;
+pub(crate) mod record;
 mod splits;
-mod tally;
+pub(crate) mod tally;
 mod tell;
 mod union;
-mod worst;
+pub(crate) mod worst;
 
 pub use config::RobustConfig;
 pub(super) use worst::LENGTH as NGRAM_LENGTH;
@@ -72,25 +70,25 @@ const SOFTENED: u8 = 3;
 /// ```
 #[derive(Clone, Debug)]
 pub struct RobustFilter<const N: usize, const V: usize, const HISTORY: usize> {
-    config: RobustConfig,
-    seed: u64,
-    observed: u32,
+    pub(crate) config: RobustConfig,
+    pub(crate) seed: u64,
+    pub(crate) observed: u32,
     /// How many moves were made since the newest place.
-    polished: u32,
-    localise_only: bool,
-    prices: Prices,
-    record: Record<HISTORY>,
-    beam: Beam<N, V, HISTORY>,
-    draft: Hypothesis<V, HISTORY>,
+    pub(crate) polished: u32,
+    pub(crate) localise_only: bool,
+    pub(crate) prices: Prices,
+    pub(crate) record: Record<HISTORY>,
+    pub(crate) beam: Beam<N, V, HISTORY>,
+    pub(crate) draft: Hypothesis<V, HISTORY>,
     model: Model<V>,
     decoder: Decoder<HISTORY>,
     forward: Forward<V>,
-    names: Names<V, HISTORY>,
-    map: Map<V>,
-    worst: WorstNgram,
-    belief_q16: [u32; V],
-    map_probability_q16: u32,
-    faults: FaultCounters,
+    pub(crate) names: Names<V, HISTORY>,
+    pub(crate) map: Map<V>,
+    pub(crate) worst: WorstNgram,
+    pub(crate) belief_q16: [u32; V],
+    pub(crate) map_probability_q16: u32,
+    pub(crate) faults: FaultCounters,
 }
 
 impl<const N: usize, const V: usize, const HISTORY: usize> RobustFilter<N, V, HISTORY> {

@@ -6,28 +6,28 @@ use crate::{Map, VertexId};
 
 /// The published numbers: 2 bytes a vertex and one a place.
 #[derive(Clone, Debug)]
-pub(super) struct Names<const V: usize, const T: usize> {
+pub(crate) struct Names<const V: usize, const T: usize> {
     /// The published vertex of each observation of the record.
-    pub(super) path: [u8; T],
+    pub(crate) path: [u8; T],
     /// For each vertex of the best hypothesis its published number.
-    pub(super) names: [u8; V],
+    pub(crate) names: [u8; V],
     /// For each published number before the last update the number now; [`NOWHERE`] when it is gone.
-    pub(super) renamed: [u8; V],
+    pub(crate) renamed: [u8; V],
     /// How many vertices were published before.
-    pub(super) vertices: u8,
+    pub(crate) vertices: u8,
 }
 
 impl<const V: usize, const T: usize> Names<V, T> {
-    pub(super) const fn new() -> Self {
+    pub(crate) const fn new() -> Self {
         Self { path: [0; T], names: [0; V], renamed: [0; V], vertices: 0 }
     }
 
-    pub(super) fn clear(&mut self) {
+    pub(crate) fn clear(&mut self) {
         self.vertices = 0;
     }
 
     /// Begins with a known map, whose vertices are numbered as they are.
-    pub(super) fn begin_with(&mut self, vertices: u8) {
+    pub(crate) fn begin_with(&mut self, vertices: u8) {
         self.vertices = vertices;
         for (number, (name, renamed)) in (0..).zip(self.names.iter_mut().zip(&mut self.renamed)) {
             (*name, *renamed) = (number, number);
@@ -35,7 +35,7 @@ impl<const V: usize, const T: usize> Names<V, T> {
     }
 
     /// Keeps all numbers, for a map that is kept as it is.
-    pub(super) fn hold(&mut self, record: &Record<T>, best: &Hypothesis<V, T>) {
+    pub(crate) fn hold(&mut self, record: &Record<T>, best: &Hypothesis<V, T>) {
         self.vertices = best.vertices;
         for (number, renamed) in (0..).zip(&mut self.renamed) {
             *renamed = number;
@@ -50,19 +50,19 @@ impl<const V: usize, const T: usize> Names<V, T> {
     }
 
     /// Takes leave of the oldest observation.
-    pub(super) fn drop_oldest(&mut self) {
+    pub(crate) fn drop_oldest(&mut self) {
         self.path.copy_within(1.., 0);
     }
 
-    pub(super) fn name(&self, vertex: u8) -> u8 {
+    pub(crate) fn name(&self, vertex: u8) -> u8 {
         self.names.get(usize::from(vertex)).copied().unwrap_or(0)
     }
 
-    pub(super) fn path(&self) -> &[u8; T] {
+    pub(crate) fn path(&self) -> &[u8; T] {
         &self.path
     }
 
-    pub(super) fn renamed(&self, before: VertexId) -> Option<VertexId> {
+    pub(crate) fn renamed(&self, before: VertexId) -> Option<VertexId> {
         let known = self.renamed.get(..usize::from(self.vertices))?;
         VertexId::new(*known.get(before.index())?)
     }
@@ -70,7 +70,7 @@ impl<const V: usize, const T: usize> Names<V, T> {
     /// Numbers the vertices of a hypothesis: those that most of the visits of a published vertex belong to keep its number,
     /// those that have no visits in the record that of the published vertex with the nearest label. `map` is what was
     /// published last. Cost: O(T + V³).
-    pub(super) fn follow(&mut self, record: &Record<T>, map: &Map<V>, best: &Hypothesis<V, T>) {
+    pub(crate) fn follow(&mut self, record: &Record<T>, map: &Map<V>, best: &Hypothesis<V, T>) {
         let mut shared = [[0_u16; V]; V];
         // The newest observation was not published yet.
         let published = record.len().saturating_sub(1);

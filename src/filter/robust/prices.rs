@@ -9,28 +9,28 @@ use crate::{Fingerprint, Turn};
 const LABEL_RANGE_STEPS: f32 = 1000.0;
 
 /// Shape of the inverse-gamma prior of a vertex's variance.
-pub(super) const SHAPE: f32 = 2.0;
+pub(crate) const SHAPE: f32 = 2.0;
 
 /// The price of a vertex. It is negative because a map of K vertices stands for the K! ways to number them.
-pub(super) const VERTEX: f32 = -1.0;
+pub(crate) const VERTEX: f32 = -1.0;
 
 /// The price of an edge: about ln of the odds against an edge in a sparse graph of a dozen vertices.
-pub(super) const EDGE: f32 = 1.5;
+pub(crate) const EDGE: f32 = 1.5;
 
 /// What the decoder charges for a move along no edge, or along one that was driven once.
-pub(super) const NEW_EDGE: f32 = 3.0;
+pub(crate) const NEW_EDGE: f32 = 3.0;
 
 /// How much of what all paths of a map add to the evidence of its best one counts. At 0 maps that fold look-alike branches
 /// onto each other win, at 1 maps that hold a place twice do; chosen on random families.
-pub(super) const SURPLUS_SHARE: f32 = 0.7;
+pub(crate) const SURPLUS_SHARE: f32 = 0.7;
 
 const HALF_LN_2_PI: f32 = 0.918_938_5;
 
 /// The prices of one run; the scale of the noise changes with what the best map shows.
 #[derive(Clone, Debug)]
-pub(super) struct Prices {
+pub(crate) struct Prices {
     /// Scale of the inverse-gamma prior of a vertex's variance, in steps²: shape · (standard deviation)².
-    pub(super) scale: f32,
+    pub(crate) scale: f32,
     /// What does not depend on the vertex in its label evidence.
     label_constant: f32,
     /// ln P of a turn hint that is right, and of one that is wrong.
@@ -40,11 +40,11 @@ pub(super) struct Prices {
 }
 
 impl Prices {
-    pub(super) const fn new() -> Self {
+    pub(crate) const fn new() -> Self {
         Self { scale: 0.0, label_constant: 0.0, turn: [0.0; 2], degree: [0.0; 3] }
     }
 
-    pub(super) fn configure(&mut self, config: &RobustConfig) {
+    pub(crate) fn configure(&mut self, config: &RobustConfig) {
         let wrong = f32::from(config.wrong_turn_permille) / 1000.0;
         self.turn = [libm::logf(1.0 - wrong), libm::logf(wrong)];
         let wrong = f32::from(config.wrong_degree_permille) / 1000.0;
@@ -53,24 +53,24 @@ impl Prices {
     }
 
     /// Takes a new standard deviation of the labels, in steps.
-    pub(super) fn set_noise(&mut self, deviation_steps: f32) {
+    pub(crate) fn set_noise(&mut self, deviation_steps: f32) {
         self.set_scale(SHAPE * deviation_steps * deviation_steps);
     }
 
     /// Takes a new scale, in steps².
-    pub(super) fn set_scale(&mut self, scale: f32) {
+    pub(crate) fn set_scale(&mut self, scale: f32) {
         self.scale = scale;
         self.label_constant =
             HALF_LN_2_PI - libm::logf(LABEL_RANGE_STEPS) - ln_gamma(SHAPE) + SHAPE * libm::logf(self.scale);
     }
 
     /// The standard deviation in force, in steps.
-    pub(super) fn noise_steps(&self) -> f32 {
+    pub(crate) fn noise_steps(&self) -> f32 {
         libm::sqrtf(self.scale / SHAPE)
     }
 
     /// ln of the density of all labels seen at a vertex, its mean and variance integrated out.
-    pub(super) fn label_evidence(&self, tally: &Tally) -> f32 {
+    pub(crate) fn label_evidence(&self, tally: &Tally) -> f32 {
         if tally.visits == 0 {
             return 0.0;
         }
@@ -81,7 +81,7 @@ impl Prices {
     }
 
     /// ln of the probability of the moves that left a vertex, and of the degrees seen at it: uniform over its ways.
-    pub(super) fn exit_evidence(&self, tally: &Tally, degree: u32) -> f32 {
+    pub(crate) fn exit_evidence(&self, tally: &Tally, degree: u32) -> f32 {
         let exits = f32::from(tally.exits);
         let ln_ways = |ways: u32| libm::logf(ways.max(1) as f32);
         if !tally.knows_degrees() {
@@ -95,7 +95,7 @@ impl Prices {
     }
 
     /// The number of ways of a vertex that explains its exits and degrees best, at least those on the map.
-    pub(super) fn likely_degree(&self, tally: &Tally, degree: u32) -> u32 {
+    pub(crate) fn likely_degree(&self, tally: &Tally, degree: u32) -> u32 {
         let least = degree.max(1);
         if !tally.knows_degrees() {
             return least;
@@ -117,7 +117,7 @@ impl Prices {
     }
 
     /// ln P of a degree that was seen at a place with so many ways; 0 for an unknown degree.
-    pub(super) fn degree(&self, seen: u8, ways: u32) -> f32 {
+    pub(crate) fn degree(&self, seen: u8, ways: u32) -> f32 {
         let [right, near, far] = self.degree;
         match (seen, u32::from(seen).abs_diff(ways.min(u32::from(DEGREE_MAX)))) {
             (0, _) => 0.0,
@@ -128,7 +128,7 @@ impl Prices {
     }
 
     /// ln P of a turn hint, given whether the robot went back.
-    pub(super) fn turn(&self, hint: Option<Turn>, went_back: bool) -> f32 {
+    pub(crate) fn turn(&self, hint: Option<Turn>, went_back: bool) -> f32 {
         let [right, wrong] = self.turn;
         match hint {
             None => 0.0,
@@ -144,7 +144,7 @@ impl Prices {
 }
 
 /// ln Γ for arguments from 0.25 on, to 10⁻⁵ (Stirling's series behind a shift by 4).
-pub(super) fn ln_gamma(x: f32) -> f32 {
+pub(crate) fn ln_gamma(x: f32) -> f32 {
     let (shifted, shift) =
         if x < 4.0 { (x + 4.0, libm::logf(x * (x + 1.0) * (x + 2.0) * (x + 3.0))) } else { (x, 0.0) };
     let inverse = 1.0 / shifted;
@@ -153,7 +153,7 @@ pub(super) fn ln_gamma(x: f32) -> f32 {
 }
 
 /// The derivative of ln Γ for arguments from 0.25 on, to 10⁻⁴.
-pub(super) fn digamma(x: f32) -> f32 {
+pub(crate) fn digamma(x: f32) -> f32 {
     let mut shifted = x;
     let mut shift = 0.0;
     while shifted < 4.0 {

@@ -3,7 +3,7 @@
 use crate::{Fingerprint, Observation, Turn};
 
 /// The largest degree that is told apart; larger ones count as this.
-pub(super) const DEGREE_MAX: u8 = 7;
+pub(crate) const DEGREE_MAX: u8 = 7;
 
 const TURN_BACK: u8 = 1;
 const TURN_ON: u8 = 2;
@@ -13,27 +13,27 @@ const CARRIED: u8 = 1 << 6;
 
 /// The newest `T` observations, the oldest first: 3 bytes each.
 #[derive(Clone, Debug)]
-pub(super) struct Record<const T: usize> {
-    pub(super) steps: [u16; T],
+pub(crate) struct Record<const T: usize> {
+    pub(crate) steps: [u16; T],
     /// Turn in bits 0 and 1, degree in bits 2 to 4, bit 5 for the first place of a sequence, bit 6 where
     /// the robot seems to have been carried.
-    pub(super) hints: [u8; T],
-    pub(super) len: usize,
+    pub(crate) hints: [u8; T],
+    pub(crate) len: usize,
 }
 
 /// One observation as the inference reads it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) struct Entry {
-    pub(super) steps: u16,
+pub(crate) struct Entry {
+    pub(crate) steps: u16,
     hints: u8,
 }
 
 impl Entry {
-    pub(super) const fn begins(self) -> bool {
+    pub(crate) const fn begins(self) -> bool {
         self.hints & (BEGINS | CARRIED) != 0
     }
 
-    pub(super) const fn turn(self) -> Option<Turn> {
+    pub(crate) const fn turn(self) -> Option<Turn> {
         match self.hints & 3 {
             TURN_BACK => Some(Turn::Back),
             TURN_ON => Some(Turn::On),
@@ -43,46 +43,46 @@ impl Entry {
 
     /// Whether an entry can have these hints.
     #[cfg(feature = "snapshot")]
-    pub(super) const fn is_possible(hints: u8) -> bool {
+    pub(crate) const fn is_possible(hints: u8) -> bool {
         hints & 3 <= TURN_ON && hints < 1 << 7
     }
 
     /// The degree, 1 to [`DEGREE_MAX`]; 0 when it is unknown.
-    pub(super) const fn degree(self) -> u8 {
+    pub(crate) const fn degree(self) -> u8 {
         self.hints >> DEGREE_SHIFT & DEGREE_MAX
     }
 }
 
 impl<const T: usize> Record<T> {
-    pub(super) const fn new() -> Self {
+    pub(crate) const fn new() -> Self {
         Self { steps: [0; T], hints: [0; T], len: 0 }
     }
 
-    pub(super) fn clear(&mut self) {
+    pub(crate) fn clear(&mut self) {
         self.len = 0;
     }
 
-    pub(super) fn len(&self) -> usize {
+    pub(crate) fn len(&self) -> usize {
         self.len
     }
 
-    pub(super) fn is_empty(&self) -> bool {
+    pub(crate) fn is_empty(&self) -> bool {
         self.len == 0
     }
 
-    pub(super) fn is_full(&self) -> bool {
+    pub(crate) fn is_full(&self) -> bool {
         self.len == T
     }
 
     /// Drops the oldest observation. The hypotheses must have taken leave of it.
-    pub(super) fn drop_oldest(&mut self) {
+    pub(crate) fn drop_oldest(&mut self) {
         self.steps.copy_within(1.., 0);
         self.hints.copy_within(1.., 0);
         self.len = self.len.saturating_sub(1);
     }
 
     /// Appends an observation; nothing happens when the record is full.
-    pub(super) fn push(&mut self, observation: &Observation) {
+    pub(crate) fn push(&mut self, observation: &Observation) {
         let entry = packed(observation);
         if let (Some(steps), Some(hints)) = (self.steps.get_mut(self.len), self.hints.get_mut(self.len)) {
             (*steps, *hints) = (entry.steps, entry.hints);
@@ -91,13 +91,13 @@ impl<const T: usize> Record<T> {
     }
 
     /// Notes whether the robot seems to have been carried to a place.
-    pub(super) fn set_carried(&mut self, index: usize, carried: bool) {
+    pub(crate) fn set_carried(&mut self, index: usize, carried: bool) {
         if let Some(hints) = self.hints.get_mut(index) {
             *hints = if carried { *hints | CARRIED } else { *hints & !CARRIED };
         }
     }
 
-    pub(super) fn get(&self, index: usize) -> Option<Entry> {
+    pub(crate) fn get(&self, index: usize) -> Option<Entry> {
         match (self.steps.get(index), self.hints.get(index)) {
             (Some(&steps), Some(&hints)) if index < self.len => Some(Entry { steps, hints }),
             _ => None,
@@ -105,19 +105,19 @@ impl<const T: usize> Record<T> {
     }
 
     /// Whether what follows an observation does not depend on the place before it: the next one comes without turn hint.
-    pub(super) fn forgets_way(&self, index: usize) -> bool {
+    pub(crate) fn forgets_way(&self, index: usize) -> bool {
         self.get(index + 1).is_some_and(|next| next.turn().is_none() && !next.begins())
     }
 
     /// All observations, the oldest first.
-    pub(super) fn iter(&self) -> impl Iterator<Item = Entry> + '_ {
+    pub(crate) fn iter(&self) -> impl Iterator<Item = Entry> + '_ {
         let all = self.steps.iter().zip(&self.hints).take(self.len);
         all.map(|(&steps, &hints)| Entry { steps, hints })
     }
 }
 
 /// An observation as an entry of the record.
-pub(super) fn packed(observation: &Observation) -> Entry {
+pub(crate) fn packed(observation: &Observation) -> Entry {
     let turn = match observation.turn {
         None => 0,
         Some(Turn::Back) => TURN_BACK,

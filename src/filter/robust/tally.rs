@@ -4,33 +4,33 @@ use super::record::{DEGREE_MAX, Entry};
 use crate::Fingerprint;
 
 /// Counts of what left the record are halved beyond this many visits, so that old places fade.
-pub(super) const FADE_VISITS: u16 = 512;
+pub(crate) const FADE_VISITS: u16 = 512;
 
 /// The sufficient statistics of one vertex: 20 bytes.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Tally {
-    pub(super) mean: f32,
-    pub(super) scatter: f32,
-    pub(super) visits: u16,
+pub(crate) struct Tally {
+    pub(crate) mean: f32,
+    pub(crate) scatter: f32,
+    pub(crate) visits: u16,
     /// How many moves left the vertex.
-    pub(super) exits: u16,
+    pub(crate) exits: u16,
     /// How often each degree was seen, that of 1 first.
-    pub(super) degrees: [u8; DEGREE_MAX as usize],
+    pub(crate) degrees: [u8; DEGREE_MAX as usize],
 }
 
 impl Tally {
-    pub(super) const NONE: Self =
+    pub(crate) const NONE: Self =
         Self { mean: 0.0, scatter: 0.0, visits: 0, exits: 0, degrees: [0; DEGREE_MAX as usize] };
 
     /// The counts that a known vertex stands for: so many visits with a mean label and a standard deviation, in steps.
-    pub(super) fn known(label: Fingerprint, visits: u16, deviation_steps: f32) -> Self {
+    pub(crate) fn known(label: Fingerprint, visits: u16, deviation_steps: f32) -> Self {
         let visits = visits.clamp(1, FADE_VISITS);
         let scatter = f32::from(visits - 1) * deviation_steps * deviation_steps;
         Self { mean: f32::from(label.steps()), scatter, visits, exits: visits, ..Self::NONE }
     }
 
     /// Takes in a visit (Welford's update).
-    pub(super) fn include(&mut self, entry: Entry) {
+    pub(crate) fn include(&mut self, entry: Entry) {
         let Some(visits) = self.visits.checked_add(1) else { return };
         let off = f32::from(entry.steps) - self.mean;
         self.mean += off / f32::from(visits);
@@ -47,7 +47,7 @@ impl Tally {
     }
 
     /// Takes in all that another vertex counted.
-    pub(super) fn add(&mut self, other: &Self) {
+    pub(crate) fn add(&mut self, other: &Self) {
         if other.visits == 0 {
             return;
         }
@@ -63,7 +63,7 @@ impl Tally {
     }
 
     /// Halves what was counted when it is more than a vertex needs; tells whether it was.
-    pub(super) fn fade(&mut self) -> bool {
+    pub(crate) fn fade(&mut self) -> bool {
         let is_more = self.visits >= FADE_VISITS;
         if is_more {
             self.scatter *= 0.5;
@@ -74,21 +74,21 @@ impl Tally {
         is_more
     }
 
-    pub(super) fn knows_degrees(&self) -> bool {
+    pub(crate) fn knows_degrees(&self) -> bool {
         self.degrees.iter().any(|&count| count > 0)
     }
 
     /// The mean label in steps.
-    pub(super) const fn mean(&self) -> f32 {
+    pub(crate) const fn mean(&self) -> f32 {
         self.mean
     }
 
-    pub(super) fn mean_label(&self) -> Fingerprint {
+    pub(crate) fn mean_label(&self) -> Fingerprint {
         Fingerprint::from_steps(libm::roundf(self.mean) as u16).unwrap_or(Fingerprint::MAX)
     }
 
     /// The sum of squared distances of the labels from their mean, in steps².
-    pub(super) const fn scatter(&self) -> f32 {
+    pub(crate) const fn scatter(&self) -> f32 {
         self.scatter
     }
 }

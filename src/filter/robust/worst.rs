@@ -17,7 +17,7 @@ const LOOKS: usize = 32;
 /// Finds max over the n-grams of the record of min over the walks of the map of Eq. 3: one half of Eq. 2. U-turns in the
 /// history add nothing to it, since the map has the U-turns of its walks too. `path` gives the vertex of each observation.
 /// Cost: O(T) and at most 32 times O(n · V · degree).
-pub(super) fn worst_ngram<const V: usize, const T: usize>(record: &Record<T>, map: &Map<V>, path: &[u8]) -> WorstNgram {
+pub(crate) fn worst_ngram<const V: usize, const T: usize>(record: &Record<T>, map: &Map<V>, path: &[u8]) -> WorstNgram {
     // How far the path is from each n-gram, by the place of its newest label: first of that label alone.
     let mut bounds = [0_u16; T];
     for ((entry, &vertex), bound) in record.iter().zip(path).zip(&mut bounds) {

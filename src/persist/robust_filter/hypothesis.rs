@@ -1,8 +1,8 @@
 //! A hypothesis in a snapshot: its path, and the counts of what left the record.
 
-use super::super::hypothesis::{Hypothesis, NOWHERE};
-use super::super::tally::Tally;
 use super::parts::{bounded, check_symmetry, read_path, read_row, save_path, save_row};
+use crate::filter::robust::hypothesis::{Hypothesis, NOWHERE};
+use crate::filter::robust::tally::Tally;
 use crate::persist::snapshot::{Reader, SnapshotError, Writer};
 
 /// Vertices, the place before the record, whether anything left it, and three floats.

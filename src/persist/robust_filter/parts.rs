@@ -1,9 +1,9 @@
 //! The pieces that a snapshot is made of: places, counts, rows, paths, and what was told last.
 
-use super::super::RobustFilter;
-use super::super::hypothesis::NOWHERE;
-use super::super::record::{Entry, Record};
-use super::super::tally::{FADE_VISITS, Tally};
+use crate::RobustFilter;
+use crate::filter::robust::hypothesis::NOWHERE;
+use crate::filter::robust::record::{Entry, Record};
+use crate::filter::robust::tally::{FADE_VISITS, Tally};
 use crate::map::bits;
 use crate::persist::snapshot::{Reader, SnapshotError, Writer};
 use crate::{Fingerprint, Map, VertexId, VertexSet};

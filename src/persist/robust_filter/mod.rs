@@ -6,10 +6,11 @@
 mod hypothesis;
 mod parts;
 
-use super::{RobustConfig, RobustFilter, worst};
 use crate::FaultCounters;
+use crate::filter::robust::worst;
 use crate::persist::Persist;
 use crate::persist::snapshot::{FILTER_SECTION, FRAME_BYTES, Reader, SnapshotError, Writer};
+use crate::{RobustConfig, RobustFilter};
 use parts::{TALLY_BYTES, path_bytes, row_bytes};
 
 /// What the contents of the filter's section begin with.
