@@ -215,10 +215,10 @@ fn export_writes_the_map_of_a_recording_and_says_what_is_wrong_with_it() {
     std::fs::write(&file, &edge).unwrap();
     let output = toposlam(&["export", name, "--format", "graphml"]);
     assert!(printed(&output).contains("<edge source=\"0\" target=\"1\"/>"));
-    assert!(String::from_utf8_lossy(&output.stderr).contains("not heard whole"));
+    assert!(String::from_utf8_lossy(&output.stderr).contains("the map is incomplete"));
 
     std::fs::write(&file, b"no robot").unwrap();
-    assert!(complaint(&toposlam(&["export", name, "--format", "svg"])).contains("no map was heard"));
+    assert!(complaint(&toposlam(&["export", name, "--format", "svg"])).contains("no map received"));
     assert!(complaint(&toposlam(&["export", name, "--format", "png"])).contains("graphml, dot, geojson, json, svg"));
     assert!(complaint(&toposlam(&["export", name, "--format", "geojson", "--edge-m", "0"])).contains("0.1 to 1000"));
 }

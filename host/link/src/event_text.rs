@@ -92,7 +92,7 @@ pub fn info(info: &Info) -> Vec<String> {
         format!("up for {:.1} s", seconds(info.uptime_ms)),
         format!("{}{mapping}", if info.paused { "paused; otherwise it " } else { "" }),
     ];
-    lines.extend(info.goal.map(|vertex| format!("on the way to vertex {vertex}")));
+    lines.extend(info.goal.map(|vertex| format!("driving to vertex {vertex}")));
     lines.push(match info.stored_bytes {
         0 => "no snapshot stored".to_owned(),
         bytes => format!("snapshot of {bytes} bytes stored {} places ago", info.stored_places_ago),

@@ -11,7 +11,7 @@
 //! while exploration.places() < 3 {
 //!     exploration.advance();
 //! }
-//! assert!(exploration.robot().mapper().map().vertices() >= 2);
+//! assert!(exploration.robot().mapper().map().vertices().len() >= 2);
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 

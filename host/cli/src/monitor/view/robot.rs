@@ -20,7 +20,7 @@ pub(super) fn draw(frame: &mut Frame<'_>, area: Rect, model: &Model) {
         lines.push(Line::from(format!("heading {heading_deg:.0}°, {speed}‰: {}", drive_state(drive.state))));
     }
     if let Some(goal_status) = picture.goal_status() {
-        lines.push(Line::from(format!("way to vertex {}: {}", goal_status.vertex, goal_status.state)));
+        lines.push(Line::from(format!("goal vertex {}: {}", goal_status.vertex, goal_status.state)));
     }
     lines.extend(told(model));
     lines.push(faults(model));
