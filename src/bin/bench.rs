@@ -4,8 +4,6 @@
 //! Run it in QEMU with `-icount shift=0`: an instruction is then a nanosecond of virtual time, SysTick counts the core
 //! clock, and the figures are the same in every run. The ticks of an instruction are measured with loops of known length;
 //! a tick is about six instructions, which is how fine the figures are.
-#![no_std]
-#![no_main]
 
 mod support;
 

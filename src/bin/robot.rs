@@ -2,8 +2,6 @@
 //!
 //! A board file: it only wires the board to `toposlam::robot`; `docs/firmware.md` has the pins, and `docs/porting.md` says what
 //! another board needs. The image is flashable as it is. In the emulator nothing but a fault uses semihosting.
-#![no_std]
-#![no_main]
 
 mod board;
 mod support;
