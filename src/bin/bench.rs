@@ -106,7 +106,7 @@ fn loop_of_known_length(turns: u32) {
 /// A filter beyond the reference robot's: more hypotheses and more vertices.
 const MORE: usize = 32;
 type LargeFilter = RobustFilter<MORE, MORE, HISTORY>;
-const LARGE_FILTER: RobustConfig = RobustConfig { hypotheses: MORE as u8, ..reference::FILTER };
+const LARGE_FILTER: RobustConfig = reference::FILTER.with_hypotheses(MORE as u8);
 
 /// One filter after the other in the same memory: all of them do not fit beside each other.
 #[allow(clippy::large_enum_variant)]
