@@ -1,9 +1,9 @@
 //! Prints the recorded input of the bench image: the simulated drive through the office plan with seed 1.
 //!
 //! ```sh
-//! cargo run --release -p toposlam-host-tests --example bench_input -- places > src/bin/support/bench_places.rs
-//! cargo run --release -p toposlam-host-tests --example bench_input -- hints > src/bin/support/bench_hints.rs
-//! cargo run --release -p toposlam-host-tests --example bench_input -- frames > src/bin/support/bench_frames.rs
+//! cargo run --release -p toposlam-host-tests --example bench_input -- places > src/bin/bench/places.rs
+//! cargo run --release -p toposlam-host-tests --example bench_input -- hints > src/bin/bench/hints.rs
+//! cargo run --release -p toposlam-host-tests --example bench_input -- frames > src/bin/bench/frames.rs
 //! ```
 
 use toposlam::Turn;

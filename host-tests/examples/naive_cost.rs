@@ -17,7 +17,7 @@ use toposlam::{Direction, Fingerprint, History, Map, Particle, VertexId};
 use toposlam_host_tests::graph::Graph;
 use toposlam_host_tests::ngram::{grams_of_graph, grams_of_history};
 
-const PLACES_MM: [u16; 400] = include!("../../src/bin/support/bench_places.rs");
+const PLACES_MM: [u16; 400] = include!("../../src/bin/bench/places.rs");
 const N: usize = reference::PAPER_FILTER.ngram_length as usize;
 const _: () = assert!(N <= 5, "n labels of 12 bits are packed into 64 bits");
 

@@ -5,9 +5,9 @@ use toposlam::reference::{self, Detector};
 use toposlam::ring::Echo;
 use toposlam_sim::world::{Plan, RobotModel, SONARS, Simulation};
 
-const PLACES_MM: [u16; 400] = include!("../../src/bin/support/bench_places.rs");
-const HINTS: [[u8; 2]; 400] = include!("../../src/bin/support/bench_hints.rs");
-const FRAMES_MM: [[u16; SONARS]; 200] = include!("../../src/bin/support/bench_frames.rs");
+const PLACES_MM: [u16; 400] = include!("../../src/bin/bench/places.rs");
+const HINTS: [[u8; 2]; 400] = include!("../../src/bin/bench/hints.rs");
+const FRAMES_MM: [[u16; SONARS]; 200] = include!("../../src/bin/bench/frames.rs");
 
 /// The first places are enough to notice that the recording is of another drive, and take a fraction of the time.
 const COMPARED_PLACES: usize = 20;

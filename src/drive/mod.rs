@@ -38,7 +38,7 @@ pub use wheels::{DifferentialDrive, MotorError, Wheel, WheelSpeeds, WheelsConfig
 pub(crate) use departures::is_departure;
 
 use crate::place::{Place, PlaceDetector};
-use crate::{ConfigError, FaultCounters, Filter, Turn, Update, VertexId};
+use crate::{ConfigError, FaultCounters, Filter, Turn, VertexId};
 use local_planner::LocalPlanner;
 use route_planner::RoutePlanner;
 
@@ -85,17 +85,17 @@ impl<const V: usize, const HISTORY: usize> Drive<V, HISTORY> {
 
     /// Returns the velocity command for a ring frame that the detector and the filter have processed.
     ///
-    /// `seen` is the place that the frame completed, if any, and the filter's update for it. With too few live sensors the
-    /// robot stops until there are enough again.
+    /// `place` is the place that the frame completed, if any; the filter has observed it. With too few live sensors the robot
+    /// stops until there are enough again.
     #[inline(never)]
     pub fn advance<const SONARS: usize, F: Filter<V>>(
         &mut self,
         detector: &PlaceDetector<SONARS>,
         filter: &F,
-        seen: Option<(&Place, &Update)>,
+        place: Option<&Place>,
     ) -> VelocityCommand {
-        if let Some((place, update)) = seen {
-            self.route_planner.arrive(filter, update);
+        if let Some(place) = place {
+            self.route_planner.arrive(filter);
             self.local_planner.arrive(place.degree);
         }
         if detector.is_blind() {

@@ -1,45 +1,45 @@
-//! Which way out of a place: exploring, or going to a vertex of the map.
+//! Chooses the exit of a place: to explore, or to drive to a vertex of the map.
 
 use rand_core::Rng;
 
-use super::departures::{Departures, WAYS, Way};
+use super::departures::{Departures, Exit, MAX_EXITS};
 use super::local_planner::Exits;
 use crate::filter::draws;
 use crate::map::PerVertex;
-use crate::{Filter, Update, VertexId, VertexSet};
+use crate::{Filter, VertexId, VertexSet};
 
-/// A robot is at a vertex when the filter believes so with at least this probability, in units of 2⁻¹⁶.
-const CONFIRMED_Q16: u32 = 1 << 15;
+/// Minimum probability of a vertex that counts as reached, in units of 2⁻¹⁶.
+const REACHED_Q16: u32 = 1 << 15;
 
-/// What the drive is asked to do.
+/// What the drive is to do.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Goal {
-    /// Leave every place by the way that was used least.
+    /// Explore: leave every place by the exit with the fewest uses.
     Explore,
-    /// Drive to this vertex of the best map and stand there.
+    /// Drive to this vertex of the best map and stop there.
     Vertex(VertexId),
-    /// Stand at the next place.
+    /// Stop at the next place.
     Stop,
 }
 
-/// How the way to a vertex goes.
+/// Status of a goal that is a vertex.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum GoalStatus {
-    /// None was asked for.
+    /// The goal is not a vertex.
     Inactive,
-    /// The robot is on its way.
+    /// The robot is driving to the vertex.
     Active,
-    /// The robot stands at the vertex: the filter believes so.
+    /// The robot stopped at the vertex: the filter gives it a probability of at least one half.
     Reached,
-    /// The vertex is not part of the best map any more.
+    /// The best map no longer contains the vertex.
     VertexRemoved,
-    /// After many more places than the map has vertices the robot is not there.
+    /// The robot visited more than `8 · V` places without reaching the vertex.
     TimedOut,
 }
 
-/// Decides at places; remembers one byte for each of `HISTORY` places.
+/// The goal and the departures of the history. Memory: one byte for each of `HISTORY` places, and some 30 bytes.
 #[derive(Clone, Debug)]
 pub(super) struct RoutePlanner<const V: usize, const HISTORY: usize> {
     seed: u64,
@@ -47,7 +47,7 @@ pub(super) struct RoutePlanner<const V: usize, const HISTORY: usize> {
     goal_status: GoalStatus,
     /// Places since the goal was set.
     places: u16,
-    /// How many decisions were made.
+    /// Number of choices since the start, the index of the random draws.
     decisions: u32,
     departures: Departures<HISTORY>,
 }
@@ -88,7 +88,7 @@ impl<const V: usize, const HISTORY: usize> RoutePlanner<V, HISTORY> {
     }
 
     pub(super) fn forget_departure(&mut self) {
-        self.departures.forget();
+        self.departures.forget_newest();
     }
 
     #[cfg(feature = "snapshot")]
@@ -96,15 +96,15 @@ impl<const V: usize, const HISTORY: usize> RoutePlanner<V, HISTORY> {
         self.departures.iter()
     }
 
-    /// Explores from here on, with these departures and no others.
+    /// Replaces the departures, oldest first, and explores.
     #[cfg(feature = "snapshot")]
     pub(super) fn resume(&mut self, departures: impl Iterator<Item = u8>) {
         self.set_goal(Goal::Explore);
         self.departures.replace(departures);
     }
 
-    /// The filter has taken in a place.
-    pub(super) fn arrive(&mut self, filter: &impl Filter<V>, _update: &Update) {
+    /// The filter has observed a place.
+    pub(super) fn arrive(&mut self, filter: &impl Filter<V>) {
         self.departures.arrive();
         self.places = self.places.saturating_add(1);
         if let (Goal::Vertex(target), GoalStatus::Active) = (self.goal, self.goal_status) {
@@ -115,35 +115,35 @@ impl<const V: usize, const HISTORY: usize> RoutePlanner<V, HISTORY> {
         }
     }
 
-    /// Chooses the way out of the place that the robot stands at; `None` to stay.
-    pub(super) fn choose(&mut self, filter: &impl Filter<V>, ways: Exits) -> Option<u8> {
-        let known = self.departures.ways(filter, if ways.is_entry_first { ways.count } else { 0 });
+    /// Chooses the exit of the present place; `None` to stop there. Time O(V² + exits · HISTORY).
+    pub(super) fn choose(&mut self, filter: &impl Filter<V>, exits: Exits) -> Option<u8> {
+        let known = self.departures.exits(filter, if exits.is_entry_first { exits.count } else { 0 });
         self.decisions = self.decisions.wrapping_add(1);
         let chosen = match self.goal {
             Goal::Stop => None,
-            Goal::Explore => self.least_used(&known, ways.count),
+            Goal::Explore => self.least_used(&known, exits.count),
             Goal::Vertex(target) => {
-                self.look_around(filter, target);
+                self.update_status(filter, target);
                 if self.goal_status == GoalStatus::Active {
-                    self.towards(filter, target, &known, ways.count)
+                    self.towards(filter, target, &known, exits.count)
                 } else {
                     None
                 }
             }
         };
         if let Some(exit) = chosen {
-            self.departures.depart(ways, exit);
+            self.departures.depart(exits, exit);
         }
         chosen
     }
 
-    /// Whether the goal_status is over.
-    fn look_around(&mut self, filter: &impl Filter<V>, target: VertexId) {
+    /// Updates the status of an active goal.
+    fn update_status(&mut self, filter: &impl Filter<V>, target: VertexId) {
         if self.goal_status != GoalStatus::Active {
             return;
         }
-        let is_there = filter.recent(0) == Some(target) && filter.place_probability_q16(target) >= CONFIRMED_Q16;
-        if is_there {
+        let is_reached = filter.recent(0) == Some(target) && filter.place_probability_q16(target) >= REACHED_Q16;
+        if is_reached {
             self.goal_status = GoalStatus::Reached;
         } else if !filter.map().contains(target) {
             self.goal_status = GoalStatus::VertexRemoved;
@@ -152,57 +152,57 @@ impl<const V: usize, const HISTORY: usize> RoutePlanner<V, HISTORY> {
         }
     }
 
-    /// The way that was used least, at random among equals.
-    fn least_used(&self, known: &[Way; WAYS], count: u8) -> Option<u8> {
-        let least = known.iter().take(usize::from(count)).map(|way| way.uses).min()?;
-        self.at_random(known, count, |way| way.uses == least)
+    /// The exit with the fewest uses, at random among equals.
+    fn least_used(&self, known: &[Exit; MAX_EXITS], count: u8) -> Option<u8> {
+        let least = known.iter().take(usize::from(count)).map(|exit| exit.uses).min()?;
+        self.at_random(known, count, |exit| exit.uses == least)
     }
 
-    /// The way to the neighbour that is nearest to the target; if it is not known which way leads there, one of which it is not
-    /// known where it leads.
-    fn towards(&self, filter: &impl Filter<V>, target: VertexId, known: &[Way; WAYS], count: u8) -> Option<u8> {
-        let steps_to = steps_to(filter, target);
-        let steps = |vertex: VertexId| steps_to[vertex];
-        let way_steps = |way: &Way| way.leads_to.and_then(steps);
-        let nearest = known.iter().take(usize::from(count)).filter_map(way_steps).min();
-        let here = filter.recent(0).and_then(steps);
+    /// The exit to the neighbour with the fewest edges to the target. If that exit is unknown, one of those that lead to an
+    /// unknown vertex.
+    fn towards(&self, filter: &impl Filter<V>, target: VertexId, known: &[Exit; MAX_EXITS], count: u8) -> Option<u8> {
+        let distances = distances_to(filter, target);
+        let distance = |vertex: VertexId| distances[vertex];
+        let exit_distance = |exit: &Exit| exit.leads_to.and_then(distance);
+        let nearest = known.iter().take(usize::from(count)).filter_map(exit_distance).min();
+        let here = filter.recent(0).and_then(distance);
         match (nearest, here) {
             (Some(nearest), Some(here)) if nearest < here => {
-                self.at_random(known, count, |way| way_steps(way) == Some(nearest))
+                self.at_random(known, count, |exit| exit_distance(exit) == Some(nearest))
             }
             _ => self
-                .at_random(known, count, |way| way.leads_to.is_none())
+                .at_random(known, count, |exit| exit.leads_to.is_none())
                 .or_else(|| self.at_random(known, count, |_| true)),
         }
     }
 
-    /// One of the ways that suit, each with the same probability.
-    fn at_random(&self, known: &[Way; WAYS], count: u8, suits: impl Fn(&Way) -> bool) -> Option<u8> {
-        let suitable = || (0..count).zip(known).filter(|(_, way)| suits(way)).map(|(number, _)| number);
+    /// One of the exits that `suits` accepts, each with the same probability.
+    fn at_random(&self, known: &[Exit; MAX_EXITS], count: u8, suits: impl Fn(&Exit) -> bool) -> Option<u8> {
+        let suitable = || (0..count).zip(known).filter(|(_, exit)| suits(exit)).map(|(number, _)| number);
         let draw = draws(self.seed, u64::from(self.decisions)).next_u32() as usize;
         suitable().nth(draw.checked_rem(suitable().count())?)
     }
 }
 
-/// Whether the best map has a way from where the robot is to a vertex.
+/// Whether the best map has a path from the robot's vertex to another one.
 pub(super) fn leads_to<const V: usize>(filter: &impl Filter<V>, vertex: VertexId) -> bool {
-    filter.recent(0).is_some_and(|here| steps_to(filter, vertex)[here].is_some())
+    filter.recent(0).is_some_and(|here| distances_to(filter, vertex)[here].is_some())
 }
 
-/// How many edges each vertex of the best map is away from another. Time O(V²).
-fn steps_to<const V: usize>(filter: &impl Filter<V>, target: VertexId) -> PerVertex<Option<u8>, V> {
+/// Number of edges from each vertex of the best map to `target`, by breadth-first search. Time O(V²).
+fn distances_to<const V: usize>(filter: &impl Filter<V>, target: VertexId) -> PerVertex<Option<u8>, V> {
     let map = filter.map();
-    let mut steps_to = PerVertex::filled(None);
+    let mut distances = PerVertex::filled(None);
     let mut reached = VertexSet::EMPTY;
     let mut newly = VertexSet::from(target);
     for steps in 0..V as u8 {
         let mut next = VertexSet::EMPTY;
         for vertex in map.vertices().filter(|&vertex| newly.contains(vertex)) {
-            steps_to[vertex] = Some(steps);
+            distances[vertex] = Some(steps);
             next |= map.neighbours(vertex);
         }
         reached |= newly;
         newly = next - reached;
     }
-    steps_to
+    distances
 }

@@ -198,8 +198,8 @@ impl<'buffer, const SONARS: usize, const N: usize, const V: usize, const HISTORY
         let mut line = Line { encoder: &mut self.encoder, faults: &mut self.faults, board };
         let seen = self.mapper.observe(frame, self.drive.turn());
         self.reporter.report(&self.mapper, seen.as_ref(), faults, |message| line.send(message));
-        let seen_now = seen.as_ref().map(|(place, update)| (place, update));
-        let velocity = self.drive.advance(self.mapper.detector(), self.mapper.filter(), seen_now);
+        let place = seen.as_ref().map(|(place, _)| place);
+        let velocity = self.drive.advance(self.mapper.detector(), self.mapper.filter(), place);
         if self.drive.holds_place() {
             self.mapper.hold_place();
         }

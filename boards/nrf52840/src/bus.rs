@@ -1,4 +1,4 @@
-//! The I2C bus of the sonars on TWIM0. Every message ends in time, also on a bus that hangs; the HAL would wait for ever.
+//! The I2C bus of the sonars on TWIM0. Every message has a timeout; the HAL's messages have none.
 
 use core::sync::atomic::{Ordering, compiler_fence};
 
@@ -16,15 +16,15 @@ const TIMEOUT_US: u32 = 5000;
 /// Why a message failed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum BusError {
-    /// Nobody answered to the address.
+    /// No device acknowledged the address.
     Address,
-    /// The sensor did not take a byte.
+    /// The device did not acknowledge a byte.
     Data,
     /// A byte was lost.
     Overrun,
-    /// The message did not end in time.
+    /// The message timed out.
     TimedOut,
-    /// Not one write and one read after it, of at most 16 bytes each.
+    /// The message is not a write, a read, or a write and a read, of 1 to 16 bytes each.
     Unsupported,
 }
 
@@ -40,38 +40,38 @@ impl Error for BusError {
     }
 }
 
-/// The bus as a controller. Messages are a write, a read, or a write and a read after it, which is all that sonars need.
+/// The bus controller. A message is a write, a read, or a write and a read, which is all that the sonars need.
 pub(crate) struct Bus {
     controller: Twim<TWIM0>,
-    // The DMA reaches RAM only, and constants lie in flash.
+    // The DMA reads RAM only, and constants are in flash.
     to_write: [u8; BUFFER_BYTES],
     was_read: [u8; BUFFER_BYTES],
 }
 
 impl Bus {
-    /// Takes the bus into service at 100 kHz, the most of the SRF08's data sheet.
+    /// Opens the bus at 100 kHz, the maximum of the SRF08's data sheet.
     pub(crate) fn open(controller: TWIM0, pins: Pins) -> Self {
         let controller = Twim::new(controller, pins, Frequency::K100);
         Self { controller, to_write: [0; BUFFER_BYTES], was_read: [0; BUFFER_BYTES] }
     }
 
     fn registers(&self) -> &RegisterBlock {
-        // SAFETY: the registers are there for ever, and the owner of the controller is here.
+        // SAFETY: the registers always exist, and `self` owns the controller.
         #[allow(unsafe_code)]
         unsafe {
             &*TWIM0::PTR
         }
     }
 
-    /// Writes and reads so many bytes of the buffers.
+    /// Writes and reads this many bytes of the buffers.
     fn message(&mut self, address: u8, write_bytes: usize, read_bytes: usize) -> Result<(), BusError> {
         let (from, to) = (self.to_write.as_ptr() as u32, self.was_read.as_mut_ptr() as u32);
         let bus = self.registers();
         bus.events_stopped.reset();
         bus.events_error.reset();
         bus.errorsrc.write(|w| w.anack().bit(true).dnack().bit(true).overrun().bit(true));
-        // SAFETY: the buffers are of at least that many bytes, and the DMA has left them when this function returns: the
-        // controller has stopped then, or it is disabled.
+        // SAFETY: the buffers have at least that many bytes, and the DMA no longer uses them when this function returns: the
+        // controller is stopped or disabled then.
         #[allow(unsafe_code)]
         unsafe {
             bus.address.write(|w| w.address().bits(address));
@@ -107,7 +107,7 @@ impl Bus {
     }
 }
 
-/// After an error the controller stops only when it is told to.
+/// Waits until the controller has stopped; `false` after the timeout. After an error it stops only on request.
 fn wait_for_stop(bus: &RegisterBlock) -> bool {
     for _ in 0..TIMEOUT_US {
         if bus.events_stopped.read().bits() != 0 {

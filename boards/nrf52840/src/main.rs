@@ -1,13 +1,19 @@
 //! The robot image for the nRF52840 on Nordic's board PCA10056: sonar ring in, wheels out, the map on the serial line of its
 //! debugger, snapshots in flash.
 //!
-//! A board file, as `src/bin/robot.rs` of the reference board is one; `docs/porting.md` compares the two. Never tried on hardware.
+//! This file connects the board to `toposlam::robot`, in the order of the reference board's `src/bin/robot/main.rs`: the `Board`
+//! implementation, then `main` (clocks, line, sonars, wheels, store, main loop), then helpers. `docs/porting.md` compares the
+//! two. Not tested on hardware.
 #![no_std]
 #![no_main]
 
 mod bus;
 mod fault;
+#[path = "../../../src/bin/shared/frame_queue.rs"]
+mod frame_queue;
 mod line;
+#[path = "../../../src/bin/shared/stack.rs"]
+mod stack;
 
 use core::convert::Infallible;
 
@@ -38,9 +44,9 @@ use toposlam::{
     wire::{QueueFull, ResetCause},
 };
 
-/// A ring that is not there answers at once; the line still gets time, for some 30 bytes.
+/// An absent ring returns at once; this pause gives the line time for some 30 bytes.
 const PACE_US: u32 = 2500;
-/// Longer than the flash takes to erase half of the store, 16 pages of 85 ms each, and than any turn of the loop.
+/// Longer than the erase of half the store, 16 pages of 85 ms each, and than any step of the main loop.
 const WATCHDOG_TICKS: u32 = 10 * 32_768;
 
 /// The board PCA10056 with a motor driver on its header.
@@ -49,7 +55,7 @@ struct Nrf52840<'a> {
     wheels: DifferentialDrive<Duty<'a>, Pin<Output<PushPull>>>,
     watchdog: WatchdogHandle<Hdl0>,
     clock: Clock,
-    /// None when what is in the flash cannot be mounted.
+    /// `None` when the flash cannot be mounted.
     store: Option<Store<Nvmc<NVMC>>>,
 }
 
@@ -63,7 +69,7 @@ impl Board for Nrf52840<'_> {
     }
 
     fn follow(&mut self, velocity: VelocityCommand) {
-        // Neither the timer nor the pins of this chip can refuse.
+        // Does not fail on this chip: timer and pins have no errors.
         let _ = self.wheels.follow(velocity);
     }
 
@@ -76,7 +82,7 @@ impl Board for Nrf52840<'_> {
     }
 
     fn stack_high_water_bytes(&mut self) -> u32 {
-        fault::stack_high_water_bytes()
+        stack::stack_high_water_bytes()
     }
 
     fn save(&mut self, snapshot: &[u8]) -> Result<(), SaveError> {
@@ -91,12 +97,12 @@ fn main() -> ! {
     static SNAPSHOT: ConstStaticCell<[u8; SNAPSHOT_BYTES]> = ConstStaticCell::new([0; SNAPSHOT_BYTES]);
 
     let (Some(device), Some(core)) = (pac::Peripherals::take(), cortex_m::Peripherals::take()) else {
-        // They are taken here for the first time.
+        // Does not happen: this is the first call.
         panic!()
     };
     let reset_cause = reset_cause(&device.POWER);
     let watchdog = start_watchdog(device.WDT);
-    // The crystal: the internal oscillator is not exact enough for the serial line.
+    // The crystal: the internal oscillator is too inaccurate for the serial line.
     let _ = Clocks::new(device.CLOCK).enable_ext_hfosc();
     let clock = Clock::start(device.TIMER0);
     let port_0 = p0::Parts::new(device.P0);
@@ -112,7 +118,7 @@ fn main() -> ! {
     let bus = Bus::open(device.TWIM0, pins);
 
     let pwm = Pwm::new(device.PWM0);
-    // Its pins are chosen while it is off; the first duty switches it on.
+    // The pins must be selected while it is off; the first duty cycle switches it on.
     pwm.disable();
     pwm.set_period(20_000_u32.hz());
     pwm.set_output_pin(Channel::C0, port_1.p1_11.into_push_pull_output(Level::Low).degrade());
@@ -156,8 +162,8 @@ fn main() -> ! {
     }
 }
 
-/// The channel of a wheel. What the HAL calls on is the output low (COMPARE without bit 15 in the product specification), so
-/// its own `SetDutyCycle` would drive at full speed for 0.
+/// The PWM channel of a wheel. The HAL's own `SetDutyCycle` is inverted: its "on" time is the low time of the output (COMPARE
+/// without bit 15 in the product specification), so a duty cycle of 0 would be full speed.
 struct Duty<'a>(PwmChannel<'a, PWM0>);
 
 impl ErrorType for Duty<'_> {
@@ -175,7 +181,7 @@ impl SetDutyCycle for Duty<'_> {
     }
 }
 
-/// Counts milliseconds from a timer of microseconds, which wraps after 71 minutes; it is asked more often.
+/// A clock of milliseconds on a timer of microseconds. The timer wraps after 71 minutes; the robot reads it more often.
 struct Clock {
     timer: Timer<TIMER0, Periodic>,
     last_us: u32,
@@ -200,7 +206,7 @@ impl Clock {
     }
 }
 
-/// Starts the watchdog, or takes over the one that runs on after a restart by software.
+/// Starts the watchdog, or recovers it when it is still running after a software reset.
 fn start_watchdog(watchdog: pac::WDT) -> WatchdogHandle<Hdl0> {
     let parts = match Watchdog::try_new(watchdog) {
         Ok(mut watchdog) => {
@@ -209,18 +215,18 @@ fn start_watchdog(watchdog: pac::WDT) -> WatchdogHandle<Hdl0> {
         }
         Err(running) => Watchdog::try_recover::<count::One>(running),
     };
-    // One that somebody else has started in another way ends it, and with that itself.
+    // A watchdog with another configuration: nothing feeds it, so it resets the chip and thereby stops.
     let Ok(parts) = parts else { panic!() };
     let (mut handle,) = parts.handles;
     handle.pet();
     handle
 }
 
-/// Why the chip started (product specification, POWER.RESETREAS); the flags are cleared for the next time. A power-on and a
-/// brown-out leave none, and cannot be told apart.
+/// Reads the cause of the last reset (product specification, POWER.RESETREAS) and clears the flags. A power-on and a brown-out
+/// both set none.
 fn reset_cause(power: &pac::POWER) -> ResetCause {
     let flags = power.resetreas.read();
-    // SAFETY: writing a flag clears it and does nothing else.
+    // SAFETY: writing a flag clears it and has no other effect.
     #[allow(unsafe_code)]
     power.resetreas.write(|w| unsafe { w.bits(flags.bits()) });
     match () {
@@ -232,7 +238,7 @@ fn reset_cause(power: &pac::POWER) -> ResetCause {
     }
 }
 
-/// The pages that `memory.x` keeps for snapshots.
+/// The flash pages that `memory.x` reserves for snapshots.
 fn store_pages() -> &'static mut [u8] {
     #[allow(unsafe_code)]
     unsafe extern "C" {
@@ -240,7 +246,7 @@ fn store_pages() -> &'static mut [u8] {
         static mut _store_end: u8;
     }
     let (start, end) = (&raw mut _store_start, &raw mut _store_end);
-    // SAFETY: the linker puts nothing there, and this is called once.
+    // SAFETY: the linker places nothing there, and this is called once.
     #[allow(unsafe_code)]
     unsafe {
         core::slice::from_raw_parts_mut(start, end.addr() - start.addr())

@@ -1,9 +1,9 @@
-//! The robot image (`src/bin/robot.rs`). On any other target than the board's it is a program that says so, so that
+//! The robot image (`src/bin/robot/main.rs`). On any other target than the board's it is a program that says so, so that
 //! `cargo build --all-features` works on a host.
 #![cfg_attr(target_os = "none", no_std, no_main)]
 
 #[cfg(target_os = "none")]
-#[path = "../robot.rs"]
+#[path = "../robot/main.rs"]
 mod image;
 
 #[cfg(not(target_os = "none"))]

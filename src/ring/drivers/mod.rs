@@ -28,7 +28,7 @@
 //! 2. Declare the file in this module and add a line to the table above.
 //! 3. Write a model of the sensor in `host/sim/src/chip`, and test the driver against it in `host-tests/tests/sonar`: valid
 //!    ranges, each fault, and the bound of the waiting time.
-//! 4. Add the driver to the fuzz target `ring_drivers` and to the no-panic proof (`src/bin/proof/ring.rs`).
+//! 4. Add the driver to the fuzz target `ring_drivers` and to the no-panic proof (`src/bin/no_panic/ring.rs`).
 //! 5. Document the wiring and the duration of a frame in `docs/wiring.md`.
 //!
 //! A ring that returns constant ranges:

@@ -1,4 +1,4 @@
-//! The serial line to the listener: an interrupt takes what comes in, and what goes out is sent while the sonars listen.
+//! The serial line to the host: received by interrupt, transmitted while the firmware waits for the sonars.
 
 use core::cell::RefCell;
 
@@ -12,22 +12,20 @@ use stm32f4xx_hal::pac::{self, interrupt};
 use stm32f4xx_hal::serial::{Rx, RxListen, Serial, Tx};
 use toposlam::wire::QueueFull;
 
-const TRANSMIT_BYTES: usize = 2048;
-/// More than the robot takes in a turn of its loop.
-const RECEIVE_BYTES: usize = 512;
+use super::frame_queue::{TransmitQueue, push_frame};
 
-/// What is to be sent.
-pub(crate) type TransmitQueue = Deque<u8, TRANSMIT_BYTES>;
+/// More than the robot reads in one step of its main loop.
+const RECEIVE_BYTES: usize = 512;
 
 static RECEIVER: Mutex<RefCell<Option<Rx<pac::USART1>>>> = Mutex::new(RefCell::new(None));
 static RECEIVED: Mutex<RefCell<Deque<u8, RECEIVE_BYTES>>> = Mutex::new(RefCell::new(Deque::new()));
 
-/// A byte at 115,200 baud lasts 87 µs, less than a slice of polishing, so an interrupt takes it. What finds no room is lost, and the
-/// checksum of its frame tells.
+/// A byte at 115,200 baud takes 87 µs, less than a refinement step of the filter, so an interrupt receives it. A byte that does
+/// not fit is lost, and the checksum of its frame detects that.
 #[interrupt]
 fn USART1() {
     free(|section| {
-        // Both are borrowed in critical sections only, so they are free.
+        // Does not fail: both are borrowed in critical sections only.
         let Ok(mut receiver) = RECEIVER.borrow(section).try_borrow_mut() else { return };
         let Ok(mut received) = RECEIVED.borrow(section).try_borrow_mut() else { return };
         let Some(receiver) = receiver.as_mut() else { return };
@@ -44,14 +42,14 @@ fn USART1() {
     });
 }
 
-/// The line's end at the robot.
+/// The robot's end of the line.
 pub(crate) struct Line {
     queue: &'static mut TransmitQueue,
     transmitter: Tx<pac::USART1>,
 }
 
 impl Line {
-    /// Takes the line into service.
+    /// Opens the line.
     pub(crate) fn open(line: Serial<pac::USART1>, queue: &'static mut TransmitQueue) -> Self {
         let (transmitter, mut receiver) = line.split();
         receiver.listen();
@@ -60,53 +58,46 @@ impl Line {
                 *slot = Some(receiver);
             }
         });
-        // SAFETY: the handler is prepared, and it shares nothing but what is behind the mutexes.
+        // SAFETY: the handler's state is initialised, and all shared state is behind mutexes.
         #[allow(unsafe_code)]
         unsafe {
             NVIC::unmask(pac::Interrupt::USART1);
         }
-        // One zero, so that noise from the start does not spoil the first frame.
+        // A zero ends a frame, so noise at the start does not corrupt the first one.
         let _ = queue.push_back(0);
         Self { queue, transmitter }
     }
 
-    /// A byte that came in.
+    /// Returns the next received byte.
     pub(crate) fn receive() -> Option<u8> {
         free(|section| RECEIVED.borrow(section).try_borrow_mut().ok()?.pop_front())
     }
 
-    /// Queues a frame whole, or not at all.
+    /// Queues a frame, whole or not at all.
     pub(crate) fn send(&mut self, frame: &[u8]) -> Result<(), QueueFull> {
-        if self.queue.capacity() - self.queue.len() < frame.len() {
-            return Err(QueueFull);
-        }
-        for &byte in frame {
-            // There is room: it was just looked for.
-            let _ = self.queue.push_back(byte);
-        }
-        Ok(())
+        push_frame(self.queue, frame)
     }
 
-    /// Hands over what the line takes at once; never waits.
+    /// Transmits as many bytes as the UART accepts without waiting.
     fn pump(&mut self) {
         while let Some(&byte) = self.queue.front() {
             match serial::Write::write(&mut self.transmitter, byte) {
                 Err(nb::Error::WouldBlock) => break,
-                // A byte that the line refuses is gone; the frame's checksum tells the listener.
+                // On an error the byte is lost, and the checksum of its frame detects that.
                 Ok(()) | Err(nb::Error::Other(_)) => self.queue.pop_front(),
             };
         }
     }
 }
 
-/// Waits, and uses the time to send.
+/// A delay that transmits meanwhile.
 pub(crate) struct SendingDelay<'a> {
     cycles_per_slice: u32,
     line: &'a RefCell<Line>,
 }
 
 impl<'a> SendingDelay<'a> {
-    /// Short of the 87 us that a byte lasts at 115,200 baud.
+    /// A slice is shorter than the 87 µs of a byte at 115,200 baud.
     const SLICES_PER_SECOND: u32 = 20_000;
     const SLICE_NS: u32 = 1_000_000_000 / Self::SLICES_PER_SECOND;
 

@@ -1,4 +1,4 @@
-//! The board's clock: ticks of the core's timer.
+//! The millisecond clock of the board: SysTick interrupts.
 
 use core::sync::atomic::{AtomicU32, Ordering};
 
@@ -7,23 +7,23 @@ use cortex_m_rt::exception;
 
 static TICKS: AtomicU32 = AtomicU32::new(0);
 
-/// A tick also ends a sleep of the UART to the bridge.
+/// Counts a tick. The interrupt also wakes the UART of the bridge.
 #[exception]
 fn SysTick() {
     TICKS.fetch_add(1, Ordering::Relaxed);
 }
 
-/// Counts milliseconds.
+/// A clock of milliseconds.
 pub(crate) struct Clock {
     ticks_per_s: u32,
 }
 
 impl Clock {
-    /// Starts the timer: 4000 ticks a second, or ten in the emulator, where the far end of a line may be slow.
+    /// Starts SysTick: 4000 ticks per second, or ten in the emulator, where the peer on the line may be slow.
     pub(crate) fn start(timer: &mut SYST, clock_hz: u32, is_emulated: bool) -> Self {
         let ticks_per_s = if is_emulated { 10 } else { 4000 };
         timer.set_clock_source(SystClkSource::Core);
-        // The emulator's core runs at 168 MHz whatever it is told: a tenth of a second is the longest that the timer can.
+        // The emulated core always runs at 168 MHz, where the largest reload value is a tenth of a second.
         timer.set_reload(if is_emulated { 16_777_215 } else { clock_hz / ticks_per_s - 1 });
         timer.clear_current();
         timer.enable_interrupt();
@@ -31,7 +31,7 @@ impl Clock {
         Self { ticks_per_s }
     }
 
-    /// Milliseconds since the start; they wrap.
+    /// Milliseconds since the start, wrapping.
     pub(crate) fn now_ms(&self) -> u32 {
         let ticks = u64::from(TICKS.load(Ordering::Relaxed));
         (ticks * 1000).checked_div(u64::from(self.ticks_per_s)).unwrap_or(0) as u32

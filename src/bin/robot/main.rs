@@ -1,19 +1,26 @@
 //! The robot image for the STM32F405RG: sonar ring in, wheels out, the map on USART1, snapshots in flash.
 //!
-//! A board file: it only wires the board to `toposlam::robot`; `docs/firmware.md` has the pins, and `docs/porting.md` says what
-//! another board needs. The image is flashable as it is. In the emulator nothing but a fault uses semihosting.
+//! This file connects the board to `toposlam::robot`, in this order: the `Board` implementation, then `main` (clocks, line,
+//! sonars, wheels, store, main loop), then helpers. `docs/firmware.md` lists the pins, `docs/porting.md` the steps for another
+//! board. The same image runs on the chip and in the emulator; only a fault uses semihosting.
 
-mod board;
-mod support;
+mod bridge_uart;
+mod clock;
+#[path = "../shared/frame_queue.rs"]
+mod frame_queue;
+mod line;
+#[path = "../shared/mod.rs"]
+mod shared;
 
 use core::cell::RefCell;
 
-use board::line::{Line, SendingDelay, TransmitQueue};
-use board::sleeping_uart::SleepingUart;
-use board::time::Clock;
+use bridge_uart::BridgeUart;
+use clock::Clock;
 use defmt_rtt as _;
 use embedded_hal::delay::DelayNs;
+use frame_queue::TransmitQueue;
 use heapless::Deque;
+use line::{Line, SendingDelay};
 use static_cell::{ConstStaticCell, StaticCell};
 use stm32f4xx_hal::{
     flash::{FlashExt, LockedFlash, UnlockedFlash},
@@ -37,9 +44,9 @@ use toposlam::{
 
 const BRIDGE_BAUD_AT_RESET: u32 = 9600;
 const BAUD: u32 = 115_200;
-/// Time for some 30 bytes on the line.
+/// An absent ring returns at once; this pause gives the line time for some 30 bytes.
 const PACE_US: u32 = 2500;
-/// Longer than the flash takes to erase a sector (4 s at most by the data sheet), and than any turn of the loop.
+/// Longer than the erase of a flash sector (at most 4 s by the data sheet) and than any step of the main loop.
 const WATCHDOG_MS: u32 = 10_000;
 
 type Motor = (ErasedChannel<pac::TIM3>, ErasedPin<Output>);
@@ -50,7 +57,7 @@ struct Stm32f405<'a> {
     wheels: DifferentialDrive<ErasedChannel<pac::TIM3>, ErasedPin<Output>>,
     watchdog: IndependentWatchdog,
     clock: Clock,
-    /// None in the emulator, which has no flash that can be written.
+    /// `None` in the emulator, whose flash is read-only.
     store: Option<Store<UnlockedFlash<'static>>>,
 }
 
@@ -64,7 +71,7 @@ impl Board for Stm32f405<'_> {
     }
 
     fn follow(&mut self, velocity: VelocityCommand) {
-        // Neither the timer nor the pins of this chip can refuse.
+        // Does not fail on this chip: timer and pins have no errors.
         let _ = self.wheels.follow(velocity);
     }
 
@@ -77,7 +84,7 @@ impl Board for Stm32f405<'_> {
     }
 
     fn stack_high_water_bytes(&mut self) -> u32 {
-        u32::try_from(support::stack_high_water_bytes()).unwrap_or(u32::MAX)
+        shared::stack_high_water_bytes()
     }
 
     fn save(&mut self, snapshot: &[u8]) -> Result<(), SaveError> {
@@ -93,9 +100,9 @@ fn main() -> ! {
     static SNAPSHOT: ConstStaticCell<[u8; SNAPSHOT_BYTES]> = ConstStaticCell::new([0; SNAPSHOT_BYTES]);
     static FLASH: StaticCell<LockedFlash> = StaticCell::new();
 
-    let is_emulated = support::is_emulated();
+    let is_emulated = shared::is_emulated();
     let (Some(device), Some(mut core)) = (pac::Peripherals::take(), cortex_m::Peripherals::take()) else {
-        // They are taken here for the first time.
+        // Does not happen: this is the first call.
         panic!()
     };
     let reset_cause = reset_cause(&device.RCC);
@@ -109,20 +116,20 @@ fn main() -> ! {
     };
     let line = RefCell::new(Line::open(line, QUEUE.take()));
 
-    // 200 polls are 4 ms while sending and 50 ms otherwise; the emulator's far end may be slow to be scheduled.
-    let bridge_on = |uart| Sc18im700::new(SleepingUart { uart, cycles_while_sending: clock_hz / 50_000 }, 200);
+    // 200 polls are 4 ms while transmitting and 50 ms otherwise; in the emulator the peer on the line may be slow.
+    let bridge_on = |uart| Sc18im700::new(BridgeUart { uart, cycles_while_sending: clock_hz / 50_000 }, 200);
     let bridge_pins = (port_a.pa2, port_a.pa3);
     let Ok(uart) = Serial::<_, u8>::new(device.USART2, bridge_pins, BRIDGE_BAUD_AT_RESET.bps(), &mut rcc) else {
         panic!()
     };
     let mut bridge = bridge_on(uart);
-    let asked = bridge.set_baud_rate(BAUD);
+    let baud_rate_set = bridge.set_baud_rate(BAUD);
     let (uart, (Some(bridge_tx), Some(bridge_rx))) = bridge.release().uart.release() else { panic!() };
     let Ok(mut uart) = Serial::<_, u8>::new(uart, (bridge_tx, bridge_rx), BAUD.bps(), &mut rcc) else { panic!() };
     uart.listen(Event::RxNotEmpty);
     let mut bridge = bridge_on(uart);
-    if let Err(error) = asked.and_then(|()| bridge.start()) {
-        defmt::warn!("the bridge to the sonars: {}", error);
+    if let Err(error) = baud_rate_set.and_then(|()| bridge.start()) {
+        defmt::warn!("sonar bridge: {}", error);
     }
 
     let (_, (left, right, ..)) = device.TIM3.pwm_hz(20.kHz(), &mut rcc);
@@ -163,13 +170,12 @@ fn main() -> ! {
         if let Some((_, update)) = robot.turn(&frame, &ring_faults, &mut board) {
             defmt::info!("{}", update);
         }
-        // A ring that is not there answers at once; the line still gets its time.
         pace.delay_us(PACE_US);
     }
 }
 
-/// Why the chip started (RM0090, RCC_CSR); the flags are cleared for the next time. A power-on sets the brown-out flag, and
-/// every reset that of the pin as well.
+/// Reads the cause of the last reset (RM0090, RCC_CSR) and clears the flags. A power-on also sets the brown-out flag, and
+/// every reset also sets the pin flag.
 fn reset_cause(controller: &pac::RCC) -> ResetCause {
     let flags = controller.csr().read();
     controller.csr().modify(|_, w| w.rmvf().set_bit());
@@ -184,7 +190,7 @@ fn reset_cause(controller: &pac::RCC) -> ResetCause {
     }
 }
 
-/// The internal 16 MHz oscillator, directly or, with the feature `pll`, multiplied to 168 MHz. The emulator has no PLL.
+/// Selects the internal 16 MHz oscillator or, with the feature `pll`, 168 MHz from the PLL, which the emulator lacks.
 fn start_clock(controller: pac::RCC) -> Rcc {
     let config = rcc::Config::hsi();
     controller.freeze(if cfg!(feature = "pll") { config.sysclk(168.MHz()) } else { config })

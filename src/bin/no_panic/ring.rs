@@ -1,4 +1,4 @@
-//! Calls of the drivers of the sonars.
+//! Calls of the fault counters, the ring and its drivers.
 
 use core::hint::black_box;
 
@@ -10,16 +10,16 @@ use embedded_hal::{
 use embedded_hal_nb::{nb, serial};
 use static_cell::ConstStaticCell;
 use toposlam::{
-    FaultCounters,
-    ring::RingFrame,
+    FaultCounters, FaultKind,
     ring::drivers::{
         AddressError, BridgeError, FiringPlan, HcSr04Config, HcSr04Ring, MaxBotixConfig, MaxBotixRing,
         MicrosecondClock, Sc18im700, SonarError, SonarRing, Srf08Config, Srf08Ring, change_maxbotix_address,
         change_srf08_address,
     },
+    ring::{Echo, RingFrame},
 };
 
-use super::{Opaque, show};
+use super::any::{Opaque, show};
 
 struct AnyLine;
 
@@ -129,7 +129,7 @@ pub(crate) fn sonar() {
     pin_ring();
 }
 
-/// A plan that the optimiser knows nothing about, three times over.
+/// One of the firing plans, hidden from the optimiser.
 fn any_plan() -> FiringPlan<16> {
     let own = FiringPlan { group_of: [3; 16].opaque() };
     black_box(own.group_count());
@@ -185,4 +185,20 @@ fn pin_ring() {
         }
         Err(error) => show::<toposlam::ConfigError>(error),
     }
+}
+
+pub(crate) fn fault() {
+    let mut counters = FaultCounters::new().opaque();
+    let other = FaultCounters::default().opaque();
+    for kind in FaultKind::ALL.opaque() {
+        counters.record(kind);
+        black_box(counters.count(kind));
+    }
+    counters.add(&other);
+    black_box(counters);
+}
+
+pub(crate) fn ring() {
+    black_box(Echo::Silence.opaque().range_mm());
+    black_box(RingFrame { echoes: [Echo::Dead.opaque(); 16] }.dead_sensors().last());
 }

@@ -1,4 +1,4 @@
-//! Calls of the drive and of the whole robot.
+//! Calls of the drive, the wheels and the whole robot.
 
 use core::convert::Infallible;
 use core::hint::black_box;
@@ -14,9 +14,9 @@ use toposlam::robot::{Board, SaveError};
 use toposlam::wire::QueueFull;
 use toposlam::{FaultCounters, VertexId};
 
-use super::{Opaque, any_frame, show};
+use super::any::{Opaque, any_frame, show};
 
-/// A board that may answer anything.
+/// A board whose answers are hidden from the optimiser.
 struct Any;
 
 impl Board for Any {

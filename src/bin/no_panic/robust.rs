@@ -1,0 +1,52 @@
+//! Calls of the robust filter.
+
+use core::hint::black_box;
+
+use static_cell::ConstStaticCell;
+use toposlam::{
+    ConfigError, Observation, RobustConfig, RobustFilter,
+    persist::Persist,
+    persist::snapshot::{FILTER_SECTION, Snapshot, Writer},
+};
+
+use super::any::{Opaque, any_fingerprint, any_turn, any_vertex, discard, show};
+
+pub(crate) fn robust_filter() {
+    static LARGE: ConstStaticCell<RobustFilter<3, 32, 32>> = ConstStaticCell::new(RobustFilter::new());
+    if let Some(filter) = LARGE.try_take() {
+        robust(filter);
+    }
+}
+
+pub(crate) fn robust<const N: usize, const V: usize, const HISTORY: usize>(filter: &mut RobustFilter<N, V, HISTORY>) {
+    if let Err(error) = filter.start(RobustConfig::default().opaque(), black_box(1)) {
+        show::<ConfigError>(error);
+    }
+    for _ in 0..black_box(3) {
+        black_box(filter.observe(any_fingerprint()));
+        let observation =
+            Observation { fingerprint: any_fingerprint(), turn: any_turn(), degree: black_box(Some(3)), begins: false };
+        black_box(filter.observe(observation.opaque()));
+        filter.polish();
+        filter.set_localise_only(black_box(true));
+        filter.polish();
+        black_box(filter.refresh());
+        black_box(filter.assume_path(&[any_vertex(); 3]));
+    }
+    let map = *filter.map();
+    let restarted = filter.start_with_map(RobustConfig::default().opaque(), black_box(1), black_box(&map));
+    let _ = black_box((restarted, filter.evidence(), filter.noise_mm()));
+    black_box((filter.map(), filter.observed(), filter.faults(), filter.renamed(any_vertex()), filter.worst()));
+    black_box((filter.place_probability_q16(any_vertex()), filter.map_probability_q16()));
+    for vertex in filter.path() {
+        black_box(vertex);
+    }
+    let mut buffer = black_box([0; 100]);
+    if let Ok(mut writer) = Writer::new(&mut buffer) {
+        discard(writer.stage(filter));
+        discard(writer.finish());
+    }
+    if let Some(section) = Snapshot::open(&buffer).ok().and_then(|snapshot| snapshot.section(FILTER_SECTION)) {
+        discard(filter.restore(section));
+    }
+}
