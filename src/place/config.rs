@@ -1,11 +1,14 @@
 //! The place detector's settings: documented defaults, checked once.
 
 use crate::ConfigError;
+use crate::ring::RingGeometry;
+use crate::setters::setters;
 
 /// When a ring frame shows a meet point, and when the robot has left it.
 ///
 /// The defaults suit a ring of 16 or 24 sonars on a robot that drives some 30 mm between two frames.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub struct PlaceConfig {
     /// Obstacles whose ranges differ by no more than this are equidistant, in millimetres. Default 150.
     ///
@@ -36,6 +39,18 @@ pub struct PlaceConfig {
 }
 
 impl PlaceConfig {
+    setters! {
+        with_equidistance_mm, equidistance_mm: u16;
+        with_leave_mm, leave_mm: u16;
+        with_separation_mrad, separation_mrad: u16;
+        with_confirm_frames, confirm_frames: u8;
+        with_leave_frames, leave_frames: u8;
+        with_settle_frames, settle_frames: u8;
+        with_range_min_mm, range_min_mm: u16;
+        with_range_max_mm, range_max_mm: u16;
+        with_live_sensors_min, live_sensors_min: u8;
+    }
+
     /// The documented defaults.
     pub const DEFAULT: Self = Self {
         equidistance_mm: 150,
@@ -48,6 +63,38 @@ impl PlaceConfig {
         range_max_mm: 6000,
         live_sensors_min: 6,
     };
+
+    /// The settings for a ring of 4 to 128 sensors.
+    ///
+    /// `live_sensors_min` is three eighths of the sensors, at least 3: 6 of 16. `separation_mrad` is the default, or 640 mrad
+    /// of beam plus the largest gap between neighbouring bearings if that is more. All other settings are the defaults.
+    /// Cost: O(SONARS²).
+    ///
+    /// ```
+    /// use toposlam::place::PlaceConfig;
+    /// use toposlam::ring::RingGeometry;
+    ///
+    /// assert_eq!(PlaceConfig::for_ring(&RingGeometry::<16>::even()), PlaceConfig::DEFAULT);
+    /// let eight = PlaceConfig::for_ring(&RingGeometry::<8>::even());
+    /// assert_eq!((eight.live_sensors_min, eight.separation_mrad), (3, 1426));
+    /// ```
+    #[must_use]
+    pub const fn for_ring<const SONARS: usize>(geometry: &RingGeometry<SONARS>) -> Self {
+        const BEAM_MRAD: i32 = 640;
+        let live = SONARS * 3 / 8;
+        let separation_mrad = BEAM_MRAD + geometry.largest_gap_mrad();
+        let separation_mrad = if separation_mrad > 2094 { 2094 } else { separation_mrad as u16 };
+        let default = Self::DEFAULT;
+        Self {
+            live_sensors_min: if live < 3 { 3 } else { live as u8 },
+            separation_mrad: if separation_mrad > default.separation_mrad {
+                separation_mrad
+            } else {
+                default.separation_mrad
+            },
+            ..default
+        }
+    }
 
     /// What a detector holds before it is started: all zero.
     pub(crate) const UNSET: Self = Self {
