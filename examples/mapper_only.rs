@@ -1,59 +1,46 @@
-//! A map from a list of places: only the filter, for a robot that detects places in its own way.
-//!
-//! Each line of `places.csv` is one visit to a place: the radius of the largest free disc around it, the number of ways
-//! that lead away (may be empty), and whether the robot left the previous place by the way it had come (`back`), by another
-//! one (`on`), or does not know (empty).
+//! Maps places that something else has detected: radii and degrees from a CSV file in, a graph of places out.
 //!
 //! ```sh
-//! cargo run --example mapper_only
+//! cargo run --release --example mapper_only                  # examples/places.csv
+//! cargo run --release --example mapper_only -- FILE.csv      # columns radius_mm,degree; an empty degree is unknown
 //! ```
 
-use toposlam::{Fingerprint, Observation, RobustConfig, RobustFilter, Turn};
+use std::error::Error;
 
-const PLACES: &str = include_str!("places.csv");
+use toposlam::{Fingerprint, Observation, RobustConfig, RobustFilter};
 
-/// At most 10 hypotheses, maps of at most 16 vertices, and a history of 400 places.
-type Filter = RobustFilter<10, 16, 400>;
+/// Refinement steps between two places. More steps find better maps; a robot runs one in each ring frame.
+const REFINEMENT_STEPS: usize = 20;
 
-fn main() -> Result<(), Box<dyn std::error::Error>> {
-    let mut filter = Box::new(Filter::new());
+fn main() -> Result<(), Box<dyn Error>> {
+    let text = match std::env::args().nth(1).filter(|argument| argument.ends_with(".csv")) {
+        Some(file) => std::fs::read_to_string(file)?,
+        None => include_str!("places.csv").to_owned(),
+    };
+    // Ten hypotheses, maps of up to 16 vertices, a history of 400 places. On a microcontroller this is a `static`.
+    let mut filter = Box::new(RobustFilter::<10, 16, 400>::new());
     filter.start(RobustConfig::DEFAULT, 1)?;
-
-    for line in PLACES.lines().skip(1) {
-        let update = filter.observe(observation(line)?);
-        // A robot refines the map while it drives to the next place, one step for each ring frame.
-        for _ in 0..20 {
-            filter.polish();
-        }
-        println!("place {:2}: {line:12} is vertex {}", update.place_index, update.vertex);
+    for line in text.lines().skip(1) {
+        let (radius_mm, degree) = line.split_once(',').ok_or("a row has two columns, radius_mm and degree")?;
+        let fingerprint = Fingerprint::from_radius_mm(radius_mm.parse()?)?;
+        filter.observe(Observation { degree: degree.parse().ok(), ..Observation::new(fingerprint) });
+        (0..REFINEMENT_STEPS).for_each(|_| filter.polish());
     }
-
-    let map = filter.map();
-    for vertex in map.vertices() {
-        let radius_mm = map.label(vertex).map_or(0, Fingerprint::radius_mm);
-        println!("vertex {vertex}: radius {radius_mm} mm, {} visits", map.visits(vertex));
+    let update = filter.refresh();
+    println!(
+        "{} places, {} vertices, now at vertex {}",
+        filter.observed(),
+        filter.map().vertices().len(),
+        update.vertex
+    );
+    println!("probability of the map among its rivals: {:.2}", f64::from(filter.map_probability_q16()) / 65536.0);
+    for (a, b) in filter.map().edges() {
+        println!("{a} -- {b}");
     }
-    let edges: Vec<String> = map.edges().map(|(a, b)| format!("{a}-{b}")).collect();
-    println!("edges: {}", edges.join(" "));
-    assert_eq!((map.vertices().len(), edges.len()), (9, 12));
     Ok(())
 }
 
-/// Parses one line of the file.
-fn observation(line: &str) -> Result<Observation, Box<dyn std::error::Error>> {
-    let mut columns = line.split(',');
-    let mut column = || columns.next().ok_or("a column is missing");
-    let mut observation = Observation::new(Fingerprint::from_radius_mm(column()?.parse()?)?);
-    observation.degree = column()?.parse().ok();
-    observation.turn = match column()? {
-        "back" => Some(Turn::Back),
-        "on" => Some(Turn::On),
-        _ => None,
-    };
-    Ok(observation)
-}
-
 #[test]
-fn the_example_finds_the_map() {
+fn the_example_maps_its_file() {
     main().unwrap();
 }
