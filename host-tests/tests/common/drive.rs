@@ -1,5 +1,6 @@
 //! A core filter and the reference filter side by side, on the same observations and the same random draws.
 
+pub use super::split_mix::Random;
 use super::{fingerprint, length};
 use toposlam::{
     Config, Direction, FaultKind, Fingerprint, PaperFilter, Particle as CoreParticle, Prior, Update, WeightFactors,
@@ -39,23 +40,7 @@ pub const MOST_PROPOSALS: usize = 128;
 /// Eq. 7 and 8 do not fall below e to the minus this in the core.
 pub const LARGEST_LOSS: f64 = 4096.0;
 
-/// A small deterministic generator (SplitMix64) for drives and draws.
-pub struct Random(pub u64);
-
 impl Random {
-    /// 64 random bits.
-    pub fn bits(&mut self) -> u64 {
-        self.0 = self.0.wrapping_add(0x9E37_79B9_7F4A_7C15);
-        let mixed = (self.0 ^ (self.0 >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
-        let mixed = (mixed ^ (mixed >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
-        mixed ^ (mixed >> 31)
-    }
-
-    /// A number below a limit.
-    pub fn below(&mut self, limit: usize) -> usize {
-        (self.bits() % limit as u64) as usize
-    }
-
     /// A connected building of so many places with a few look-alikes, labels on the grid.
     pub fn building(&mut self, places: usize) -> Graph {
         let spacing_mm = [60.0, 200.0, 400.0][self.below(3)];

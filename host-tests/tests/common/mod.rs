@@ -8,6 +8,7 @@ pub mod environments;
 pub mod notes;
 pub mod random;
 pub mod robot;
+pub mod split_mix;
 pub mod watched;
 
 use toposlam::{Consistency, Direction, Evidence, Fingerprint, History, Map, NgramLength, NgramTable, VertexId};

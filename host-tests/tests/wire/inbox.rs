@@ -134,7 +134,7 @@ fn floods() -> Vec<(&'static str, FaultKind, Flood)> {
         Box::new(move |count| bytes.iter().copied().cycle().take(count).collect())
     }
     let mut random = Random(3);
-    let noise: Flood = Box::new(move |count| (0..count).map(|_| random.next() as u8).collect());
+    let noise: Flood = Box::new(move |count| (0..count).map(|_| random.bits() as u8).collect());
     let (mut id, mut encoder) = (0, Encoder::new(0));
     let mut flood_of = move |command: fn(u16) -> Command| -> Flood {
         let mut encoder = std::mem::take(&mut encoder);

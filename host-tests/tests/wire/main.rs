@@ -10,6 +10,8 @@ mod robot;
 mod samples;
 mod schema;
 mod specification;
+#[path = "../common/split_mix.rs"]
+mod split_mix;
 mod streams;
 
 use samples::{largest, typical};

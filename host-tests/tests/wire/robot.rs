@@ -9,22 +9,9 @@ use toposlam::{
 
 pub(crate) const TICKS_PER_HELLO: u16 = 20;
 
-/// SplitMix64.
-pub(crate) struct Random(pub(crate) u64);
+pub(crate) use super::split_mix::Random;
 
 impl Random {
-    pub(crate) fn next(&mut self) -> u64 {
-        self.0 = self.0.wrapping_add(0x9E37_79B9_7F4A_7C15);
-        let mut z = self.0;
-        z = (z ^ (z >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
-        z ^ (z >> 31)
-    }
-
-    pub(crate) fn below(&mut self, bound: usize) -> usize {
-        (self.next() % bound as u64) as usize
-    }
-
     /// One of the first `count` vertices.
     pub(crate) fn vertex(&mut self, count: usize) -> VertexId {
         vertex(self.below(count))

@@ -20,7 +20,7 @@ use toposlam_sim::injector::FaultRates;
 
 use super::drive::{DriveArguments, Summary, fault_rate};
 use super::hardship;
-use super::heard::Heard;
+use super::received::Received;
 
 /// Where `cargo firmware` puts the image.
 const IMAGE: &str = "thumbv7em-none-eabihf/firmware/robot";
@@ -77,7 +77,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     });
     let (tell_velocity, velocities) = mpsc::channel::<VelocityCommand>();
     let progress = Progress::new("", arguments.places, "places");
-    let mut heard = Heard::new();
+    let mut heard = Received::new();
     let mut elsewhere = None;
     let mut frames = 0;
     let (repeated, bar) = (&repetition, &progress);
@@ -152,7 +152,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
 }
 
 /// Compares the messages of the firmware with the simulation.
-fn compare(exploration: &Exploration<'_>, heard: &Heard) -> anyhow::Result<()> {
+fn compare(exploration: &Exploration<'_>, heard: &Received) -> anyhow::Result<()> {
     let (steps, mapper) = (exploration.steps(), exploration.robot().mapper());
     let map = mapper.map();
     let places = steps.iter().map(|step| (step.update.place_index, step.place.fingerprint.radius_mm()));

@@ -23,7 +23,7 @@ use toposlam_sim::exploration::Exploration;
 use toposlam_sim::injector::{FaultRates, LineInjector};
 
 use super::drive::{DriveArguments, Summary};
-use super::heard::Heard;
+use super::received::Received;
 
 /// The world stands still for so long when the firmware does not say where it drives: a fault may have begun a frame for the
 /// sensors that is none for the firmware.
@@ -63,7 +63,7 @@ pub(super) fn run(
     let trial = Mutex::new(Trial { exploration, frames: 0, is_over: false });
     let (tell_velocity, velocities) = mpsc::channel::<VelocityCommand>();
     let bar = Progress::new("", places, "places");
-    let mut heard = Heard::new();
+    let mut heard = Received::new();
     let mut line = LineInjector::new(rates, arguments.seed());
     let mut fetch = Fetch::new();
     let mut turns: u32 = 0;

@@ -10,7 +10,6 @@ pub(crate) mod export;
 mod filter;
 pub(crate) mod fleet;
 mod hardship;
-mod heard;
 mod interrupt;
 #[cfg(not(all(feature = "mqtt", feature = "recording")))]
 mod missing;
@@ -20,6 +19,7 @@ mod on_graph;
 pub(crate) mod play;
 #[cfg(feature = "mqtt")]
 pub(crate) mod publish;
+mod received;
 #[cfg(feature = "recording")]
 pub(crate) mod record;
 pub(crate) mod replay;

@@ -1,3 +1,5 @@
+//! Fleets of simulated robots over TCP.
+
 use super::crowd::{Afterwards, Crowd, Life, Pace};
 use super::*;
 use std::io::Write;

@@ -1,22 +1,22 @@
-//! What the emulated firmware says on its line.
+//! The messages that the emulated firmware sent.
 
 use std::ops::ControlFlow;
 
 use toposlam::wire::{Decoder, MapReplica, Message, Progress};
 
-/// What the firmware said.
-pub(super) struct Heard {
+/// The decoder, the map replica and the places of the firmware.
+pub(super) struct Received {
     pub(super) decoder: Decoder,
     pub(super) replica: MapReplica<64>,
     pub(super) places: Vec<(u32, u16)>,
 }
 
-impl Heard {
+impl Received {
     pub(super) const fn new() -> Self {
         Self { decoder: Decoder::new(), replica: MapReplica::new(), places: Vec::new() }
     }
 
-    /// Takes bytes of the line, and hands on every message.
+    /// Decodes bytes of the line, and passes every message on.
     pub(super) fn feed(
         &mut self,
         bytes: &[u8],
