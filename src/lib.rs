@@ -131,6 +131,7 @@
 //! | Section IV.A, meet points | `place/` |
 #![cfg_attr(not(test), no_std)]
 #![forbid(unsafe_code)]
+#![cfg_attr(docsrs, feature(doc_cfg))]
 
 mod bearing;
 #[cfg(feature = "snapshot")]
@@ -150,6 +151,7 @@ pub mod reference;
 pub mod ring;
 #[cfg(feature = "wire")]
 pub mod robot;
+mod setters;
 #[cfg(feature = "wire")]
 pub mod wire;
 

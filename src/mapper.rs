@@ -2,6 +2,7 @@
 
 use crate::place::{Place, PlaceConfig, PlaceDetector};
 use crate::ring::{RingFrame, RingGeometry};
+use crate::setters::setters;
 use crate::{ConfigError, FaultCounters, Filter, Map, Observation, RobustConfig, Turn, Update};
 
 /// The most refinement steps between two places. Later steps rarely improve the map, and a robot may stand for days.
@@ -11,6 +12,7 @@ const REFINEMENT_STEPS_IN_DOUBT: u16 = 400;
 
 /// The settings of a [`Mapper`]; `C` are those of the filter.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub struct MapperConfig<const SONARS: usize, C> {
     /// The directions of the sensors.
     pub geometry: RingGeometry<SONARS>,
@@ -22,7 +24,37 @@ pub struct MapperConfig<const SONARS: usize, C> {
     pub seed: u64,
 }
 
+impl<const SONARS: usize, C: Copy> MapperConfig<SONARS, C> {
+    /// The settings for a ring and a filter: the place detector's for the ring, and seed 1.
+    #[must_use]
+    pub const fn new(geometry: RingGeometry<SONARS>, filter: C) -> Self {
+        Self { geometry, place: PlaceConfig::for_ring(&geometry), filter, seed: 1 }
+    }
+
+    setters! {
+        with_geometry, geometry: RingGeometry<SONARS>;
+        with_place, place: PlaceConfig;
+        with_filter, filter: C;
+        with_seed, seed: u64;
+    }
+}
+
 impl<const SONARS: usize> MapperConfig<SONARS, RobustConfig> {
+    /// The settings for a ring of 4 to 128 sensors and the robust filter with its defaults.
+    ///
+    /// ```
+    /// use toposlam::ring::RingGeometry;
+    /// use toposlam::{Mapper, MapperConfig, RobustFilter};
+    ///
+    /// let mut mapper = Mapper::<8, 16, RobustFilter<10, 16, 400>>::new();
+    /// mapper.start(&MapperConfig::for_ring(RingGeometry::even()))?;
+    /// # Ok::<(), toposlam::ConfigError>(())
+    /// ```
+    #[must_use]
+    pub const fn for_ring(geometry: RingGeometry<SONARS>) -> Self {
+        Self::new(geometry, RobustConfig::DEFAULT)
+    }
+
     #[cfg(feature = "wire")]
     pub(crate) const UNSET: Self = Self {
         geometry: RingGeometry { bearings_mrad: [0; SONARS] },

@@ -14,16 +14,11 @@
 //! # Ok::<(), toposlam::ConfigError>(())
 //! ```
 
+#[cfg(feature = "wire")]
+use crate::robot::{Robot, RobotConfig};
 use crate::{
     Config, Direction, Mapper, MapperConfig, PaperFilter, RobustConfig, RobustFilter, place::PlaceConfig,
     place::PlaceDetector, ring::RingGeometry,
-};
-#[cfg(feature = "wire")]
-use crate::{
-    drive::DriveConfig,
-    persist::snapshot::SnapshotPolicy,
-    robot::{self, Robot},
-    wire::ResetCause,
 };
 
 /// Sonars in the ring.
@@ -70,14 +65,7 @@ pub const MAPPER: MapperConfig<SONARS, RobustConfig> =
 pub type ReferenceRobot<'buffer> = Robot<'buffer, SONARS, HYPOTHESES, VERTICES, HISTORY>;
 /// The settings of the whole robot.
 #[cfg(feature = "wire")]
-pub const ROBOT: robot::RobotConfig<SONARS> = robot::RobotConfig {
-    mapper: MAPPER,
-    drive: DriveConfig::DEFAULT,
-    snapshot: SnapshotPolicy::DEFAULT,
-    turn_bound_ms: 1000,
-    boot: 0,
-    reset_cause: ResetCause::Unknown,
-};
+pub const ROBOT: RobotConfig<SONARS> = RobotConfig::for_ring(RING);
 
 /// The most particles of the paper's filter, where it stands in for the reference robot's.
 pub const PAPER_PARTICLES: usize = 10;
@@ -93,3 +81,38 @@ pub type PaperReference = PaperFilter<PAPER_PARTICLES, VERTICES, PAPER_HISTORY_W
 #[cfg(feature = "snapshot")]
 const _: () =
     assert!(Filter::SNAPSHOT_BYTES + HISTORY + 16 <= SNAPSHOT_BYTES, "the buffer has room for every hypothesis");
+
+#[cfg(all(test, feature = "wire"))]
+mod tests {
+    use super::*;
+    use crate::drive::DriveConfig;
+    use crate::persist::snapshot::SnapshotPolicy;
+    use crate::wire::ResetCause;
+
+    #[test]
+    fn the_settings_for_a_ring_of_sixteen_are_those_of_the_reference_robot() {
+        let expected = RobotConfig {
+            mapper: MAPPER,
+            drive: DriveConfig::DEFAULT,
+            snapshot: SnapshotPolicy::DEFAULT,
+            turn_bound_ms: 1000,
+            boot: 0,
+            reset_cause: ResetCause::Unknown,
+        };
+        assert_eq!(ROBOT, expected);
+    }
+
+    #[test]
+    fn a_ring_of_any_size_has_valid_settings() {
+        fn check<const SONARS: usize>() {
+            let place = PlaceConfig::for_ring(&RingGeometry::<SONARS>::even());
+            assert_eq!(place.check(SONARS), Ok(()), "{SONARS}");
+        }
+        check::<4>();
+        check::<5>();
+        check::<8>();
+        check::<12>();
+        check::<24>();
+        check::<128>();
+    }
+}

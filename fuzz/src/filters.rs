@@ -12,7 +12,7 @@ pub const VERTICES: usize = 8;
 pub type Small = RobustFilter<HYPOTHESES, VERTICES, 40>;
 
 /// The settings of a small filter.
-pub const CONFIG: RobustConfig = RobustConfig { hypotheses: HYPOTHESES as u8, ..RobustConfig::DEFAULT };
+pub const CONFIG: RobustConfig = RobustConfig::DEFAULT.with_hypotheses(HYPOTHESES as u8);
 
 /// Where the contents of the filter's section have the number of moves at a place.
 const MOVES_AT: usize = 9;

@@ -13,7 +13,7 @@ use std::collections::VecDeque;
 use std::process::exit;
 
 use toposlam::reference::{self, PAPER_HISTORY_WORDS, PAPER_PARTICLES, PaperReference, VERTICES};
-use toposlam::{Config, Direction, Fingerprint, History, Map, Particle, VertexId};
+use toposlam::{Direction, Fingerprint, History, Map, Particle, VertexId};
 use toposlam_host_tests::graph::Graph;
 use toposlam_host_tests::ngram::{grams_of_graph, grams_of_history};
 
@@ -103,7 +103,7 @@ fn count(direction: Direction) -> Vec<Place> {
     let halves = if direction == Direction::TwoSided { 2 } else { 1 };
     let mut filter = Box::new(PaperReference::new());
     filter
-        .start(Config { direction, ..reference::PAPER_FILTER }, reference::SEED)
+        .start(reference::PAPER_FILTER.with_direction(direction), reference::SEED)
         .expect("the reference settings are valid");
     let mut history = VecDeque::new();
     let mut places = Vec::new();

@@ -14,14 +14,13 @@ fn config(random: &mut Random, direction: Direction) -> Config {
     // Beyond a σ_l of 113 mm the core interpolates Eq. 9, which is coarse for a φ near 1.
     let (largest_sigma_label_mm, penalties_permille) =
         if random.below(2) == 0 { (113, [0, 100, 300, 900, 999]) } else { (300, [0, 50, 100, 200, 300]) };
-    Config {
-        ngram_length: [2, 3, 3, 4, 5][random.below(5)],
-        particles: 1 + random.below(10) as u8,
-        penalty_permille: penalties_permille[random.below(5)],
-        sigma_label_mm: 10 + random.below(largest_sigma_label_mm - 9) as u16,
-        sigma_consistency_mm: 10 + random.below(150) as u16,
-        direction,
-    }
+    Config::DEFAULT
+        .with_ngram_length([2, 3, 3, 4, 5][random.below(5)])
+        .with_particles(1 + random.below(10) as u8)
+        .with_penalty_permille(penalties_permille[random.below(5)])
+        .with_sigma_label_mm(10 + random.below(largest_sigma_label_mm - 9) as u16)
+        .with_sigma_consistency_mm(10 + random.below(150) as u16)
+        .with_direction(direction)
 }
 
 /// Drives both filters through so many buildings; they agree at every place, and ties are rare.
@@ -63,14 +62,12 @@ fn maps_too_far_from_the_evidence_to_tell_apart_are_drawn_by_the_other_factors()
     for seed in 0..150 {
         let mut random = Random(seed);
         let building = random.building(4);
-        let config = Config {
-            ngram_length: 3,
-            particles: 10,
-            sigma_consistency_mm: 1 + random.below(4) as u16,
-            sigma_label_mm: 100,
-            direction: DIRECTIONS[seed as usize % 3],
-            ..Config::DEFAULT
-        };
+        let config = Config::DEFAULT
+            .with_ngram_length(3)
+            .with_particles(10)
+            .with_sigma_consistency_mm(1 + random.below(4) as u16)
+            .with_sigma_label_mm(100)
+            .with_direction(DIRECTIONS[seed as usize % 3]);
         let evidence =
             if random.below(2) == 0 { Evidence::OnLine } else { Evidence::Prior(random.walk(&building, 20, 15)) };
         let mut drive = Drive::new(config, &evidence);
@@ -84,7 +81,7 @@ fn maps_too_far_from_the_evidence_to_tell_apart_are_drawn_by_the_other_factors()
 fn an_empty_prior_leaves_the_choice_to_the_other_factors() {
     for (seed, direction) in (0..).zip(DIRECTIONS.into_iter().cycle().take(30)) {
         let mut random = Random(seed);
-        let config = Config { ngram_length: 3, direction, ..Config::DEFAULT };
+        let config = Config::DEFAULT.with_ngram_length(3).with_direction(direction);
         let mut drive = Drive::new(config, &Evidence::Prior(Vec::new()));
         let building = random.building(4);
         for observation_mm in random.walk(&building, 10, 5) {
@@ -97,12 +94,10 @@ fn an_empty_prior_leaves_the_choice_to_the_other_factors() {
 fn long_n_grams_with_coarse_labels_agree() {
     for seed in 0..40 {
         let mut random = Random(seed);
-        let config = Config {
-            ngram_length: 6 + random.below(2) as u8,
-            particles: 5,
-            direction: DIRECTIONS[seed as usize % 3],
-            ..Config::DEFAULT
-        };
+        let config = Config::DEFAULT
+            .with_ngram_length(6 + random.below(2) as u8)
+            .with_particles(5)
+            .with_direction(DIRECTIONS[seed as usize % 3]);
         let building = random.building(3);
         let evidence =
             if random.below(2) == 0 { Evidence::OnLine } else { Evidence::Prior(random.walk(&building, 8, 3)) };
@@ -117,7 +112,7 @@ fn long_n_grams_with_coarse_labels_agree() {
 fn a_drive_longer_than_the_history_agrees_and_counts_what_was_dropped() {
     for (seed, direction) in (0..).zip(DIRECTIONS) {
         let mut random = Random(seed);
-        let mut drive = Drive::new(Config { ngram_length: 3, direction, ..Config::DEFAULT }, &Evidence::OnLine);
+        let mut drive = Drive::new(Config::DEFAULT.with_ngram_length(3).with_direction(direction), &Evidence::OnLine);
         let building = random.building(4);
         for observation_mm in random.walk(&building, 45, 3) {
             drive.observe(observation_mm, &mut random);
@@ -130,7 +125,11 @@ fn a_drive_longer_than_the_history_agrees_and_counts_what_was_dropped() {
 fn a_map_without_room_for_a_new_vertex_is_reported_and_goes_on_with_what_it_has() {
     for (seed, direction) in (0..).zip(DIRECTIONS) {
         let mut random = Random(seed);
-        let config = Config { ngram_length: 2, penalty_permille: 0, sigma_label_mm: 20, direction, ..Config::DEFAULT };
+        let config = Config::DEFAULT
+            .with_ngram_length(2)
+            .with_penalty_permille(0)
+            .with_sigma_label_mm(20)
+            .with_direction(direction);
         let mut drive = Drive::new(config, &Evidence::OnLine);
         for place in 0..VERTICES + 4 {
             assert_eq!(drive.faults(FaultKind::VerticesFull), place.saturating_sub(VERTICES) as u32);
@@ -144,7 +143,7 @@ fn a_map_without_room_for_a_new_vertex_is_reported_and_goes_on_with_what_it_has(
 fn a_map_of_one_vertex_pays_one_minus_phi_because_eq_9_includes_a_equal_b() {
     for penalty_permille in [0_u16, 1, 100, 500, 999] {
         let mut filter = PaperFilter::<1, 4, 1>::new();
-        filter.start(Config { penalty_permille, particles: 1, ..Config::DEFAULT }, 0).unwrap();
+        filter.start(Config::DEFAULT.with_penalty_permille(penalty_permille).with_particles(1), 0).unwrap();
         filter.observe(fingerprint(1200.0));
         let phi = f64::from(penalty_permille) / 1000.0;
         let of_core = f64::from(filter.best().factors.ln_size_q16) / 65536.0;
@@ -154,7 +153,7 @@ fn a_map_of_one_vertex_pays_one_minus_phi_because_eq_9_includes_a_equal_b() {
 
 /// Everything a filter tells about a drive of 40 places.
 fn told(filter: &mut PaperFilter<10, 16, 4>, seed: u64) -> Vec<String> {
-    filter.start(Config { ngram_length: 4, ..Config::DEFAULT }, seed).unwrap();
+    filter.start(Config::DEFAULT.with_ngram_length(4), seed).unwrap();
     let mut random = Random(7);
     let building = random.building(5);
     let mut observe = |observation_mm| {

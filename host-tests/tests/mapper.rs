@@ -10,9 +10,9 @@ use toposlam::wire::{
 use toposlam::{FaultCounters, Filter, Mapper, MapperConfig, Observation, Turn};
 use toposlam_sim::world::{Plan, RobotModel, Simulation};
 
-fn config<C>(filter: C) -> MapperConfig<SONARS, C> {
+fn config<C: Copy>(filter: C) -> MapperConfig<SONARS, C> {
     let (geometry, place) = (reference::RING, reference::PLACE);
-    MapperConfig { geometry, place, filter, seed: 1 }
+    MapperConfig::new(geometry, filter).with_place(place).with_seed(1)
 }
 
 fn simulation() -> Simulation {

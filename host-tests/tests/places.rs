@@ -139,16 +139,14 @@ proptest! {
         separation_mrad in 1u16..=2094,
         (confirm_frames, leave_frames) in (1u8..20, 1u8..20),
     ) {
-        let config = PlaceConfig {
-            equidistance_mm,
-            leave_mm: equidistance_mm + more_mm,
-            separation_mrad,
-            confirm_frames,
-            leave_frames,
-            range_max_mm: 65_534,
-            live_sensors_min: 3,
-            ..PlaceConfig::DEFAULT
-        };
+        let config = PlaceConfig::DEFAULT
+            .with_equidistance_mm(equidistance_mm)
+            .with_leave_mm(equidistance_mm + more_mm)
+            .with_separation_mrad(separation_mrad)
+            .with_confirm_frames(confirm_frames)
+            .with_leave_frames(leave_frames)
+            .with_range_max_mm(65_534)
+            .with_live_sensors_min(3);
         let mut detector = PlaceDetector::<SONARS>::new();
         detector.start(config, reference::RING).unwrap();
         for (frame_index, echoes) in frames.iter().enumerate() {

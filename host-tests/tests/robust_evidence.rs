@@ -56,12 +56,10 @@ fn agree(drives: u64, most_places: usize, longest: usize, told: Told) {
         let places = 2 + random.below(most_places - 1);
         let building = random.building(places);
         let noise_steps = [1, 5, 15][random.below(3)];
-        let config = RobustConfig {
-            hypotheses: 1 + random.below(10) as u8,
-            noise_mm: [10, 30, 60][random.below(3)],
-            moves: random.below(4) as u8,
-            ..RobustConfig::DEFAULT
-        };
+        let config = RobustConfig::DEFAULT
+            .with_hypotheses(1 + random.below(10) as u8)
+            .with_noise_mm([10, 30, 60][random.below(3)])
+            .with_moves(random.below(4) as u8);
         let mut watched = Watched::<10, 7, 64>::new(config, seed);
         for observation in drive(&mut random, &building, longest, noise_steps, told) {
             watched.observe(observation);

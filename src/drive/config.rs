@@ -1,11 +1,13 @@
 //! Settings of the drive, checked once at the start.
 
 use crate::ConfigError;
+use crate::setters::setters;
 
 /// Settings of the motion along the Voronoi graph.
 ///
 /// The defaults are for a robot that drives some 30 mm between two ring frames.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub struct DriveConfig {
     /// Speed along an edge, in thousandths of the robot's full speed, 1 to 1000. Default 1000.
     pub speed_permille: u16,
@@ -22,6 +24,14 @@ pub struct DriveConfig {
 }
 
 impl DriveConfig {
+    setters! {
+        with_speed_permille, speed_permille: u16;
+        with_look_ahead_mm, look_ahead_mm: u16;
+        with_arrival_tolerance_mm, arrival_tolerance_mm: u16;
+        with_clearance_mm, clearance_mm: u16;
+        with_timeout_frames, timeout_frames: u16;
+    }
+
     /// The documented defaults.
     pub const DEFAULT: Self = Self {
         speed_permille: 1000,

@@ -1,5 +1,6 @@
 //! Differential drive: velocity command to wheel speeds, wheel speeds to PWM duty cycle and direction.
 
+use crate::setters::setters;
 use core::fmt;
 
 use embedded_hal::{digital::OutputPin, pwm::SetDutyCycle};
@@ -9,6 +10,7 @@ use crate::ConfigError;
 
 /// Settings of a robot with two driven wheels.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub struct WheelsConfig {
     /// Heading above which the robot turns in place, in milliradians, 1 to 3142. Default 600.
     pub spin_from_mrad: i16,
@@ -22,6 +24,13 @@ pub struct WheelsConfig {
 }
 
 impl WheelsConfig {
+    setters! {
+        with_spin_from_mrad, spin_from_mrad: i16;
+        with_spin_permille, spin_permille: u16;
+        with_steer_permille_per_rad, steer_permille_per_rad: u16;
+        with_dead_zone_permille, dead_zone_permille: u16;
+    }
+
     /// The documented defaults.
     pub const DEFAULT: Self =
         Self { spin_from_mrad: 600, spin_permille: 500, steer_permille_per_rad: 800, dead_zone_permille: 0 };

@@ -1,11 +1,14 @@
 //! Settings of the place detector, checked once at the start.
 
 use crate::ConfigError;
+use crate::ring::RingGeometry;
+use crate::setters::setters;
 
 /// Settings of the place detector: when a frame shows a meet point, and when the robot has left it.
 ///
 /// The defaults are for a ring of 16 or 24 sonars on a robot that drives some 30 mm between two frames.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub struct PlaceConfig {
     /// Largest difference of range between equidistant obstacles, in millimetres, at least 1. Default 150.
     ///
@@ -35,6 +38,18 @@ pub struct PlaceConfig {
 }
 
 impl PlaceConfig {
+    setters! {
+        with_equidistance_mm, equidistance_mm: u16;
+        with_leave_mm, leave_mm: u16;
+        with_separation_mrad, separation_mrad: u16;
+        with_confirm_frames, confirm_frames: u8;
+        with_leave_frames, leave_frames: u8;
+        with_settle_frames, settle_frames: u8;
+        with_range_min_mm, range_min_mm: u16;
+        with_range_max_mm, range_max_mm: u16;
+        with_live_sensors_min, live_sensors_min: u8;
+    }
+
     /// The documented defaults.
     pub const DEFAULT: Self = Self {
         equidistance_mm: 150,
@@ -47,6 +62,38 @@ impl PlaceConfig {
         range_max_mm: 6000,
         live_sensors_min: 6,
     };
+
+    /// The settings for a ring of 4 to 128 sensors.
+    ///
+    /// `live_sensors_min` is three eighths of the sensors, at least 3: 6 of 16. `separation_mrad` is the default, or 640 mrad
+    /// of beam plus the largest gap between neighbouring bearings if that is more. All other settings are the defaults.
+    /// Cost: O(SONARS²).
+    ///
+    /// ```
+    /// use toposlam::place::PlaceConfig;
+    /// use toposlam::ring::RingGeometry;
+    ///
+    /// assert_eq!(PlaceConfig::for_ring(&RingGeometry::<16>::even()), PlaceConfig::DEFAULT);
+    /// let eight = PlaceConfig::for_ring(&RingGeometry::<8>::even());
+    /// assert_eq!((eight.live_sensors_min, eight.separation_mrad), (3, 1426));
+    /// ```
+    #[must_use]
+    pub const fn for_ring<const SONARS: usize>(geometry: &RingGeometry<SONARS>) -> Self {
+        const BEAM_MRAD: i32 = 640;
+        let live = SONARS * 3 / 8;
+        let separation_mrad = BEAM_MRAD + geometry.largest_gap_mrad();
+        let separation_mrad = if separation_mrad > 2094 { 2094 } else { separation_mrad as u16 };
+        let default = Self::DEFAULT;
+        Self {
+            live_sensors_min: if live < 3 { 3 } else { live as u8 },
+            separation_mrad: if separation_mrad > default.separation_mrad {
+                separation_mrad
+            } else {
+                default.separation_mrad
+            },
+            ..default
+        }
+    }
 
     /// The settings of a detector before its start: all zero.
     pub(crate) const UNSET: Self = Self {

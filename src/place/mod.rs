@@ -25,7 +25,7 @@
 //! use toposlam::ring::{Echo, RingFrame, RingGeometry};
 //!
 //! let mut detector = PlaceDetector::<4>::new();
-//! detector.start(PlaceConfig { live_sensors_min: 4, ..PlaceConfig::DEFAULT }, RingGeometry::even())?;
+//! detector.start(PlaceConfig::DEFAULT.with_live_sensors_min(4), RingGeometry::even())?;
 //! // Along a corridor 1.6 m wide to the wall at its end, and back; the sensor behind receives no echo.
 //! let mut places = Vec::new();
 //! for step in -50_i32..=50 {

@@ -32,4 +32,25 @@ impl<const SONARS: usize> RingGeometry<SONARS> {
         }
         Self { bearings_mrad }
     }
+
+    /// The largest gap between two neighbouring bearings, in milliradians. Cost: O(SONARS²).
+    pub(crate) const fn largest_gap_mrad(&self) -> i32 {
+        let bearings = self.bearings_mrad.as_slice();
+        let (mut largest, mut rest) = (0, bearings);
+        while let [bearing, tail @ ..] = rest {
+            let (mut gap, mut others) = (6283, bearings);
+            while let [other, next @ ..] = others {
+                let ahead = (*other as i32 - *bearing as i32).rem_euclid(6283);
+                if ahead > 0 && ahead < gap {
+                    gap = ahead;
+                }
+                others = next;
+            }
+            if gap > largest {
+                largest = gap;
+            }
+            rest = tail;
+        }
+        largest
+    }
 }

@@ -2,11 +2,14 @@
 
 use crate::drive::DriveConfig;
 use crate::persist::snapshot::SnapshotPolicy;
+use crate::ring::RingGeometry;
+use crate::setters::setters;
 use crate::wire::{Capacities, Hello, ResetCause};
 use crate::{Filter, MapperConfig, RobustConfig};
 
 /// The settings of every stage.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub struct RobotConfig<const SONARS: usize> {
     /// From the ring frame to the map.
     pub mapper: MapperConfig<SONARS, RobustConfig>,
@@ -23,6 +26,42 @@ pub struct RobotConfig<const SONARS: usize> {
 }
 
 impl<const SONARS: usize> RobotConfig<SONARS> {
+    setters! {
+        with_mapper, mapper: MapperConfig<SONARS, RobustConfig>;
+        with_drive, drive: DriveConfig;
+        with_snapshot, snapshot: SnapshotPolicy;
+        with_turn_bound_ms, turn_bound_ms: u16;
+        with_boot, boot: u32;
+        with_reset_cause, reset_cause: ResetCause;
+    }
+
+    /// The settings for a ring of 4 to 128 sensors.
+    ///
+    /// A robot that drives itself stands at a meet point until the place is reported. So `settle_frames` is 15, shorter than
+    /// the default. All other settings follow from the ring, or are the defaults.
+    ///
+    /// ```
+    /// use toposlam::ring::RingGeometry;
+    /// use toposlam::robot::{Robot, RobotConfig};
+    ///
+    /// let mut robot = Box::new(Robot::<12, 10, 16, 400>::new());
+    /// robot.start(&RobotConfig::for_ring(RingGeometry::even()), &mut [])?;
+    /// # Ok::<(), toposlam::ConfigError>(())
+    /// ```
+    #[must_use]
+    pub const fn for_ring(geometry: RingGeometry<SONARS>) -> Self {
+        let mut mapper = MapperConfig::for_ring(geometry);
+        mapper.place.settle_frames = 15;
+        Self {
+            mapper,
+            drive: DriveConfig::DEFAULT,
+            snapshot: SnapshotPolicy::DEFAULT,
+            turn_bound_ms: 1000,
+            boot: 0,
+            reset_cause: ResetCause::Unknown,
+        }
+    }
+
     pub(super) const UNSET: Self = Self {
         mapper: MapperConfig::UNSET,
         drive: DriveConfig::UNSET,

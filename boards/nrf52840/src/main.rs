@@ -40,7 +40,7 @@ use toposlam::{
     persist::store::{BootPolicy, Store},
     reference::{ROBOT, ReferenceRobot, SNAPSHOT_BYTES, SONARS},
     ring::drivers::{SonarRing, Srf08Config, Srf08Ring},
-    robot::{Board, SaveError, RobotConfig},
+    robot::{Board, SaveError},
     wire::{QueueFull, ResetCause},
 };
 
@@ -132,7 +132,7 @@ fn main() -> ! {
     let range = 0..pages.len() as u32;
     let mut store = Store::mount(Nvmc::new(device.NVMC, pages), range).ok();
     let boot = store.as_mut().and_then(|store| store.count_start().ok()).unwrap_or(0);
-    let config = RobotConfig { boot, reset_cause, ..ROBOT };
+    let config = ROBOT.with_boot(boot).with_reset_cause(reset_cause);
     let robot = ROBOT_CELL.take();
     let started = match &mut store {
         Some(store) => robot.boot(&config, SNAPSHOT.take(), store, BootPolicy::default()).map(|_| ()),

@@ -34,17 +34,15 @@ pub(crate) struct Srf08<'a> {
 pub(crate) fn srf08(settings: &Srf08<'_>, bus: impl I2c) {
     let default = if settings.is_srf10 { Srf08Config::SRF10 } else { Srf08Config::DEFAULT };
     let (min_range_mm, max_range_mm) = settings.range_mm.unwrap_or((default.min_range_mm, default.max_range_mm));
-    let config = Srf08Config {
-        first_address: settings.first_address.unwrap_or(default.first_address),
-        plan: plan(settings.groups),
-        timeout_ms: settings.timeout_ms.into(),
-        // Coarse, so that a frame has at most some hundreds of polls.
-        poll_interval_us: u16::from(settings.poll_interval) * 257,
-        speed_of_sound_m_per_s: settings.speed_m_per_s.unwrap_or(default.speed_of_sound_m_per_s),
-        min_range_mm,
-        max_range_mm,
-        ..default
-    };
+    // The poll interval is coarse, so that a frame has at most some hundreds of polls.
+    let config = default
+        .with_first_address(settings.first_address.unwrap_or(default.first_address))
+        .with_plan(plan(settings.groups))
+        .with_timeout_ms(settings.timeout_ms.into())
+        .with_poll_interval_us(u16::from(settings.poll_interval) * 257)
+        .with_speed_of_sound_m_per_s(settings.speed_m_per_s.unwrap_or(default.speed_of_sound_m_per_s))
+        .with_min_range_mm(min_range_mm)
+        .with_max_range_mm(max_range_mm);
     let waited = Waited::default();
     let bus = Counted { bus, transactions: 0 };
     let Ok(mut ring) = Srf08Ring::<_, _, SONARS>::new(bus, &waited, config) else { return };
@@ -67,12 +65,11 @@ pub(crate) struct MaxBotix<'a> {
 }
 
 pub(crate) fn max_botix(settings: &MaxBotix<'_>, bus: impl I2c) {
-    let config = MaxBotixConfig {
-        first_address: settings.first_address.unwrap_or(MaxBotixConfig::<SONARS>::DEFAULT.first_address),
-        plan: plan(settings.groups),
-        ranging_ms: settings.ranging_ms,
-        cycle_ms: settings.cycle_ms,
-    };
+    let config = MaxBotixConfig::DEFAULT
+        .with_first_address(settings.first_address.unwrap_or(MaxBotixConfig::<SONARS>::DEFAULT.first_address))
+        .with_plan(plan(settings.groups))
+        .with_ranging_ms(settings.ranging_ms)
+        .with_cycle_ms(settings.cycle_ms);
     let waited = Waited::default();
     let bus = Counted { bus, transactions: 0 };
     let Ok(mut ring) = MaxBotixRing::<_, _, SONARS>::new(bus, &waited, config) else { return };
@@ -99,17 +96,16 @@ pub(crate) struct HcSr04<'a> {
 
 pub(crate) fn hc_sr04(settings: &HcSr04<'_>, clock: &[u8], answers: &[u8]) {
     let (min_range_mm, max_range_mm) = settings.range_mm;
-    let config = HcSr04Config {
-        plan: plan(settings.groups),
-        trigger_us: settings.trigger_us,
-        rise_timeout_us: settings.rise_timeout_us.into(),
-        echo_timeout_us: settings.echo_timeout_us,
-        cycle_ms: settings.cycle_ms,
-        stopped_clock_polls: (settings.stopped_clock_polls % 32).into(),
-        speed_of_sound_m_per_s: settings.speed_m_per_s.unwrap_or(343),
-        min_range_mm,
-        max_range_mm,
-    };
+    let config = HcSr04Config::DEFAULT
+        .with_plan(plan(settings.groups))
+        .with_trigger_us(settings.trigger_us)
+        .with_rise_timeout_us(settings.rise_timeout_us.into())
+        .with_echo_timeout_us(settings.echo_timeout_us)
+        .with_cycle_ms(settings.cycle_ms)
+        .with_stopped_clock_polls((settings.stopped_clock_polls % 32).into())
+        .with_speed_of_sound_m_per_s(settings.speed_m_per_s.unwrap_or(343))
+        .with_min_range_mm(min_range_mm)
+        .with_max_range_mm(max_range_mm);
     let groups = config.plan.group_count() as u32;
     // At each poll the clock advances by a multiple of 8 µs, stops, or goes back: at most this many polls.
     let steps = (u32::from(config.rise_timeout_us) + u32::from(config.echo_timeout_us)) / 8 + 4;

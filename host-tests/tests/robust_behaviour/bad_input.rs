@@ -98,19 +98,19 @@ fn anything() -> impl Strategy<Value = Observation> {
 
 fn config() -> impl Strategy<Value = RobustConfig> {
     (prop_oneof![Just(1_u16), Just(30), Just(1000)], 0_u8..4, 1_u16..=500, 1_u16..=500).prop_map(
-        |(noise_mm, moves, wrong_turn_permille, wrong_degree_permille)| RobustConfig {
-            hypotheses: 1,
-            noise_mm,
-            moves,
-            wrong_turn_permille,
-            wrong_degree_permille,
-            ..RobustConfig::DEFAULT
+        |(noise_mm, moves, wrong_turn_permille, wrong_degree_permille)| {
+            RobustConfig::DEFAULT
+                .with_hypotheses(1)
+                .with_noise_mm(noise_mm)
+                .with_moves(moves)
+                .with_wrong_turn_permille(wrong_turn_permille)
+                .with_wrong_degree_permille(wrong_degree_permille)
         },
     )
 }
 
 fn bears<const N: usize, const V: usize>(config: RobustConfig, observations: &[(Observation, u8)], seed: u64) {
-    let config = RobustConfig { hypotheses: N as u8, ..config };
+    let config = config.with_hypotheses(N as u8);
     let mut watched = Watched::<N, V, 8>::new(config, seed);
     for (observation, polish) in observations {
         watched.observe(*observation);

@@ -22,7 +22,7 @@ fn localiser(environment: &Environment, seed: u64) -> Localiser {
 
 fn localiser_with(map: &Map<16>, seed: u64) -> Localiser {
     let mut filter = Localiser::new(RobustFilter::new());
-    let config = RobustConfig { noise_mm: 15, ..RobustConfig::DEFAULT };
+    let config = RobustConfig::DEFAULT.with_noise_mm(15);
     filter.start_with_map(config, seed, map).unwrap();
     filter.set_localise_only(true);
     filter
@@ -181,7 +181,7 @@ fn a_robot_that_localises_before_it_has_a_map_begins_to_map_when_it_may() {
     let environment = six_rooms();
     let mut robot = Robot::new(&environment, Hints::default(), 1);
     let mut filter = Localiser::new(RobustFilter::new());
-    filter.start(RobustConfig { noise_mm: 15, ..RobustConfig::DEFAULT }, 1).unwrap();
+    filter.start(RobustConfig::DEFAULT.with_noise_mm(15), 1).unwrap();
     filter.set_localise_only(true);
     for index in 0..5 {
         assert_eq!(filter.observe(robot.step()).place_index, index);

@@ -77,7 +77,7 @@ fn turn_hints_that_are_wrong_or_missing_do_not_cost_the_map() {
 fn a_first_guess_at_the_noise_that_is_off_by_a_factor_of_two_gives_the_same_map() {
     // The places of this environment have a standard deviation of 20 mm.
     for noise_mm in [10, 20, 40] {
-        let config = RobustConfig { noise_mm, ..RobustConfig::DEFAULT };
+        let config = RobustConfig::DEFAULT.with_noise_mm(noise_mm);
         let exact = exact_of_ten(&easy(), Hints::default(), config, 100);
         println!("guess {noise_mm} mm: {exact} of 10 exact");
         assert!(exact >= 9, "{noise_mm}: {exact}");

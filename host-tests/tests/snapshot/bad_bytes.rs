@@ -57,7 +57,7 @@ fn goes_on(filter: &mut Small) {
 /// Restores some contents; a filter that refuses them must not have changed. Tells whether it took them.
 fn bears(bytes: &[u8]) -> bool {
     let mut filter = Box::new(Small::new());
-    filter.start(RobustConfig { hypotheses: 3, ..RobustConfig::DEFAULT }, 1).unwrap();
+    filter.start(RobustConfig::DEFAULT.with_hypotheses(3), 1).unwrap();
     for steps in [500, 800, 500, 1100] {
         filter.observe(Fingerprint::from_steps(steps).unwrap());
     }
@@ -126,7 +126,7 @@ fn contents_that_are_cut_or_too_long_are_refused() {
 #[test]
 fn a_snapshot_without_any_hypothesis_is_refused_because_no_filter_could_go_on_with_it() {
     let mut filter = Box::new(Small::new());
-    filter.start(RobustConfig { hypotheses: 3, ..RobustConfig::DEFAULT }, 1).unwrap();
+    filter.start(RobustConfig::DEFAULT.with_hypotheses(3), 1).unwrap();
     let bytes = contents(&saved(&mut filter, ROOM).unwrap());
     assert!(bears(&bytes));
     // Vertices, the place before, whether counts left the history, surplus and faded: all there is of a hypothesis of nothing.

@@ -30,7 +30,7 @@ struct Drive {
 impl Drive {
     fn start<const N: usize, const V: usize, const T: usize>(&self) -> Box<RobustFilter<N, V, T>> {
         let mut filter = Box::new(RobustFilter::new());
-        let config = RobustConfig { hypotheses: N as u8, ..self.config };
+        let config = self.config.with_hypotheses(N as u8);
         if self.known {
             let mut map = Map::new();
             for (number, radius_mm) in [900, 1300, 1700, 2100, 2500].into_iter().enumerate() {
@@ -113,10 +113,7 @@ fn drives(places: usize) -> Vec<Drive> {
         plain("floor", walk(&floor(), Hints::default(), 1, &[])),
         plain("floor with hints", walk(&floor(), all, 2, &[])),
         plain("six rooms, carried twice", walk(&six_rooms(), all, 3, &[places / 3, places / 2])),
-        Drive {
-            config: RobustConfig { moves: 3, ..RobustConfig::DEFAULT },
-            ..plain("easy", walk(&easy(), all, 4, &[]))
-        },
+        Drive { config: RobustConfig::DEFAULT.with_moves(3), ..plain("easy", walk(&easy(), all, 4, &[])) },
         Drive { known: true, ..plain("known map", walk(&easy(), all, 5, &[])) },
         Drive {
             known: true,

@@ -10,7 +10,7 @@ use super::common::notes::Notes;
 
 fn started<F: Filter<VERTICES>>(filter: F::Config) -> Box<Mapper<SONARS, VERTICES, F>> {
     let mut mapper = Box::new(Mapper::new());
-    let config = MapperConfig { geometry: reference::RING, place: reference::PLACE, filter, seed: 1 };
+    let config = MapperConfig::new(reference::RING, filter).with_place(reference::PLACE).with_seed(1);
     mapper.start(&config).unwrap();
     mapper
 }
@@ -49,7 +49,7 @@ fn the_next_place_begins_a_sequence_when_the_robot_may_be_elsewhere() {
     let mut mapper = started::<Notes>(9);
     assert_eq!(mapper.restore(&buffer[..length - 1], Resume::AtUnknownVertex), Err(SnapshotError::TooShort));
     mapper.restore(&buffer[..length], Resume::AtUnknownVertex).unwrap();
-    let config = MapperConfig { geometry: reference::RING, place: reference::PLACE, filter: 9, seed: 1 };
+    let config = MapperConfig::new(reference::RING, 9).with_place(reference::PLACE).with_seed(1);
     mapper.start(&config).unwrap();
     drive(&mut mapper, &mut simulation(), 1);
     assert_eq!((begins_of(&mapper), mapper.filter().history), (vec![false], 9));

@@ -51,7 +51,7 @@ fn new_maxbotix_sensors_become_a_ring_at_other_addresses() {
         change_maxbotix_address(&mut bus, &mut time.clone(), 0x70, 0x30 + sensor as u8).unwrap();
         assert_eq!(bus.devices.address(sensor), 0x30 + sensor as u8);
     }
-    let config = MaxBotixConfig { first_address: 0x30, ..MaxBotixConfig::DEFAULT };
+    let config = MaxBotixConfig::DEFAULT.with_first_address(0x30);
     let mut ring = MaxBotixRing::<_, _, 16>::new(bus, time, config).unwrap();
     assert_eq!(ring.read(&mut FaultCounters::new()).dead_sensors().count(), 0);
 }

@@ -129,7 +129,7 @@ proptest! {
             (pin.clone(), pin)
         });
         let mut waited = Waited::default();
-        let config = HcSr04Config { stopped_clock_polls: 100, ..HcSr04Config::DEFAULT };
+        let config = HcSr04Config::DEFAULT.with_stopped_clock_polls(100);
         let mut ring = HcSr04Ring::new(pins, Noise::of(clock), &mut waited, config).unwrap();
         let mut faults = FaultCounters::new();
         assert_sound(ring.read(&mut faults), &faults, 20, 4000);

@@ -45,7 +45,7 @@ fn srf08_have_crosstalk_when_fired_together_and_none_in_separate_groups() {
     assert_separates("SRF08", |plan| {
         let mut devices = Srf08Bank::new(|| Some(rough()), 3);
         devices.set_cross_talk(true);
-        let config = Srf08Config { plan, ..Srf08Config::DEFAULT };
+        let config = Srf08Config::DEFAULT.with_plan(plan);
         Srf08Ring::new(I2cBus { devices }, &mut Waited::default(), config).unwrap().read(&mut FaultCounters::new())
     });
 }
@@ -56,7 +56,7 @@ fn maxbotix_have_crosstalk_when_fired_together_and_none_in_separate_groups() {
         let time = SimulatedTime::new(0, 0);
         let mut devices = MaxBotixBank::new(|| Some(rough()), time.clone());
         devices.set_cross_talk(true);
-        let config = MaxBotixConfig { plan, ..MaxBotixConfig::DEFAULT };
+        let config = MaxBotixConfig::DEFAULT.with_plan(plan);
         MaxBotixRing::new(I2cBus { devices }, time, config).unwrap().read(&mut FaultCounters::new())
     });
 }
@@ -67,7 +67,7 @@ fn hc_sr04_have_crosstalk_when_fired_together_and_none_in_separate_groups() {
         let time = SimulatedTime::new(0, 1000);
         let bank = HcSr04Bank::new(|| Some(rough()), time.clone());
         bank.set_cross_talk(true);
-        let config = HcSr04Config { plan, ..HcSr04Config::DEFAULT };
+        let config = HcSr04Config::DEFAULT.with_plan(plan);
         let mut ring = HcSr04Ring::new(bank.pins(), time.clone(), time, config).unwrap();
         ring.read(&mut FaultCounters::new())
     });

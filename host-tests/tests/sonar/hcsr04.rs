@@ -54,7 +54,7 @@ fn the_ring_measures_the_world_and_takes_60_ms_for_each_group() {
     for start_us in [0, (1 << 32) - 100_000] {
         for groups in [1, 2, 4, 16] {
             let time = SimulatedTime::new(start_us, 2000);
-            let config = HcSr04Config { plan: FiringPlan::interleaved(groups), ..HcSr04Config::DEFAULT };
+            let config = HcSr04Config::DEFAULT.with_plan(FiringPlan::interleaved(groups));
             let (mut ring, bank) = ring(config, &time);
             let mut faults = FaultCounters::new();
             for number in 0..10 {
@@ -136,7 +136,7 @@ fn a_clone_with_a_long_pulse_is_silent_in_every_frame() {
 #[test]
 fn a_stopped_clock_is_detected_in_bounded_time() {
     let mut time = SimulatedTime::new(0, 0);
-    let (mut ring, _bank) = ring(HcSr04Config { stopped_clock_polls: 500, ..HcSr04Config::DEFAULT }, &time);
+    let (mut ring, _bank) = ring(HcSr04Config::DEFAULT.with_stopped_clock_polls(500), &time);
     let mut faults = FaultCounters::new();
     let frame = ring.read(&mut faults);
     assert_eq!(frame, RingFrame { echoes: [Echo::Dead; 16] });
@@ -169,7 +169,7 @@ fn the_signals_on_the_pins_are_those_of_the_data_sheet() {
     // The first group: start, four iterations. Then a read for the cycle time, and the second group.
     let clock = Recited([100, 500, 600, 6331, 12_262, 30_100, 60_100, 60_600, 66_431].into());
     let waits = [Wait::delay_us(12), Wait::delay_us(30_000), Wait::delay_us(12)];
-    let config = HcSr04Config { plan: FiringPlan::interleaved(2), ..HcSr04Config::DEFAULT };
+    let config = HcSr04Config::DEFAULT.with_plan(FiringPlan::interleaved(2));
     let mut ring = HcSr04Ring::new(pins, clock, CheckedDelay::new(&waits), config).unwrap();
     let mut faults = FaultCounters::new();
     let frame = ring.read(&mut faults);

@@ -40,7 +40,7 @@ fn ring(
 fn the_ring_measures_in_centimetres_and_takes_100_ms_for_each_group() {
     for groups in [1, 2, 4] {
         let time = SimulatedTime::new(0, 0);
-        let config = MaxBotixConfig { plan: FiringPlan::interleaved(groups), ..MaxBotixConfig::DEFAULT };
+        let config = MaxBotixConfig::DEFAULT.with_plan(FiringPlan::interleaved(groups));
         let mut ring = ring(config, &time, &[]);
         let mut faults = FaultCounters::new();
         for number in 0..50 {

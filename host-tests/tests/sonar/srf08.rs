@@ -40,7 +40,7 @@ fn ring_with_fault(
 fn the_ring_measures_the_world_in_one_group_or_several() {
     for firing_groups in [1, 2, 3, 4, 16] {
         let mut waited = Waited::default();
-        let config = Srf08Config { plan: FiringPlan::interleaved(firing_groups), ..Srf08Config::DEFAULT };
+        let config = Srf08Config::DEFAULT.with_plan(FiringPlan::interleaved(firing_groups));
         let mut ring = ring(world(), config, &mut waited);
         let mut faults = FaultCounters::new();
         for number in 0..50 {
@@ -67,7 +67,7 @@ fn a_faulty_sensor_is_dead_and_counted_and_the_others_are_read() {
         for sensor in [0_u8, 7, 15] {
             for (defect, echo, fault) in cases {
                 let mut waited = Waited::default();
-                let config = Srf08Config { plan: FiringPlan::interleaved(firing_groups), ..Srf08Config::DEFAULT };
+                let config = Srf08Config::DEFAULT.with_plan(FiringPlan::interleaved(firing_groups));
                 let mut ring = ring_with_fault(world(), config, &mut waited, Some((sensor.into(), defect)));
                 let mut faults = FaultCounters::new();
                 for number in 0..2 {
@@ -86,7 +86,7 @@ fn a_faulty_sensor_is_dead_and_counted_and_the_others_are_read() {
 fn a_sensor_that_never_finishes_takes_at_most_the_timeout() {
     let mut waited = Waited::default();
     let plan = FiringPlan::together();
-    let config = Srf08Config { plan, timeout_ms: 100, poll_interval_us: 3000, ..Srf08Config::DEFAULT };
+    let config = Srf08Config::DEFAULT.with_plan(plan).with_timeout_ms(100).with_poll_interval_us(3000);
     let mut ring = ring_with_fault(world(), config, &mut waited, Some((4, SensorFault::NeverDone)));
     ring.read(&mut FaultCounters::new());
     assert_eq!(waited.nanoseconds, 33 * 3_000_000);
@@ -155,7 +155,7 @@ fn a_single_group_starts_with_one_message_to_the_general_call_address() {
         Transaction::write_read(0x70, vec![0x00], vec![0x06, 0x80, 0x16, 0xC7]),
         Transaction::write_read(0x71, vec![0x00], vec![0x06, 0x80, 0xFF, 0xFF]),
     ];
-    let config = Srf08Config { plan: FiringPlan::together(), ..Srf08Config::DEFAULT };
+    let config = Srf08Config::DEFAULT.with_plan(FiringPlan::together());
     let mut waited = Waited::default();
     let mut ring = Srf08Ring::<_, _, 2>::new(I2cMock::new(&expected), &mut waited, config).unwrap();
     let mut faults = FaultCounters::new();

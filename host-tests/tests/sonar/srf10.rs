@@ -14,7 +14,7 @@ use crate::{Waited, World, assert_counted, without, world, world_frame};
 #[test]
 fn sensors_that_do_not_acknowledge_while_they_measure_are_read_with_any_plan() {
     for groups in [1, 2, 3, 16] {
-        let config = Srf08Config { plan: FiringPlan::interleaved(groups), ..Srf08Config::SRF10 };
+        let config = Srf08Config::SRF10.with_plan(FiringPlan::interleaved(groups));
         let mut waited = Waited::default();
         let bus = I2cBus { devices: Srf08Bank::srf10(world(), 3) };
         let mut ring = Srf08Ring::<_, _, 16>::new(bus, &mut waited, config).unwrap();
@@ -54,7 +54,7 @@ fn a_single_group_starts_each_sensor_at_its_own_address() {
         Transaction::write_read(0x71, vec![0x00], vec![0x05, 0x80, 0x16, 0xC7]),
         Transaction::write_read(0x70, vec![0x00], vec![0x05, 0x80, 0x00, 0x00]),
     ];
-    let config = Srf08Config { plan: FiringPlan::together(), ..Srf08Config::SRF10 };
+    let config = Srf08Config::SRF10.with_plan(FiringPlan::together());
     let mut waited = Waited::default();
     let mut ring = Srf08Ring::<_, _, 2>::new(I2cMock::new(&expected), &mut waited, config).unwrap();
     assert_eq!(ring.read(&mut FaultCounters::new()).echoes, [Echo::Silence, Echo::Range { range_mm: 1000 }]);

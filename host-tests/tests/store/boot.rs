@@ -5,7 +5,7 @@ use toposlam::drive::VelocityCommand;
 use toposlam::persist::snapshot::SnapshotError;
 use toposlam::persist::store::{BootOutcome, BootPolicy, BootReport, StoreError, resume};
 use toposlam::reference::ReferenceRobot;
-use toposlam::robot::{Board, RobotConfig, SaveError};
+use toposlam::robot::{Board, SaveError};
 use toposlam::wire::{Decoder, Message, Progress, QueueFull};
 use toposlam::{FaultCounters, Filter};
 use toposlam_sim::chip::{Cut, Tear};
@@ -63,7 +63,7 @@ fn the_robot_introduces_itself_with_the_number_of_its_start() {
     let mut store = Store::mount(Sectors::new(8), reference::STORE).unwrap();
     for number in 1..5 {
         let boot = store.count_start().unwrap();
-        let config = RobotConfig { boot, ..reference::ROBOT };
+        let config = reference::ROBOT.with_boot(boot);
         let mut buffer = [0; reference::SNAPSHOT_BYTES];
         let mut robot = Box::new(ReferenceRobot::new());
         robot.boot(&config, &mut buffer, &mut store, BootPolicy::default()).unwrap();

@@ -177,6 +177,6 @@ fn started<const SONARS: usize, F: Filter<VERTICES>>(
 ) -> Result<Box<Mapper<SONARS, VERTICES, F>>, ConfigError> {
     let mut mapper = Box::new(Mapper::new());
     let (place, seed) = (reference::PLACE, reference::SEED);
-    mapper.start(&MapperConfig { geometry, place, filter, seed })?;
+    mapper.start(&MapperConfig::new(geometry, filter).with_place(place).with_seed(seed))?;
     Ok(mapper)
 }

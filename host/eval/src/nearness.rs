@@ -91,7 +91,7 @@ mod tests {
         // Eight sonars, 45 degrees apart: two neighbours are one obstacle, and the last is a neighbour of the first.
         let frame = |ranges_mm: [u16; 8]| RingFrame { echoes: ranges_mm.map(|range_mm| Echo::Range { range_mm }) };
         let measured = |ranges_mm| {
-            let config = PlaceConfig { separation_mrad: 1047, equidistance_mm: 150, ..PlaceConfig::DEFAULT };
+            let config = PlaceConfig::DEFAULT.with_separation_mrad(1047).with_equidistance_mm(150);
             let nearness = Nearness::of(&[frame(ranges_mm)], &RingGeometry::even(), &config);
             (nearness.on_graph, nearness.at_meet_point)
         };

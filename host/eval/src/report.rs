@@ -103,7 +103,7 @@ impl From<Filter> for FilterReport {
                 sigma_label_mm,
                 sigma_consistency_mm,
                 direction,
-                ngram_length: _,
+                ..
             }) => Self::Paper {
                 hypotheses: particles,
                 penalty: f64::from(penalty_permille) / 1000.0,

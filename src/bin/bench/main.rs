@@ -3,8 +3,6 @@
 //!
 //! Run it in QEMU with `-icount shift=0`: an instruction then takes a nanosecond of virtual time, and the figures are the
 //! same in every run. Their resolution is one tick of SysTick, about six instructions.
-#![no_std]
-#![no_main]
 
 mod clock;
 mod costs;
@@ -43,7 +41,7 @@ const FRAMES_MM: [[u16; SONARS]; 200] = include!("frames.rs");
 /// A filter with more hypotheses and more vertices than the reference robot's.
 const MORE: usize = 32;
 type LargeFilter = RobustFilter<MORE, MORE, HISTORY>;
-const LARGE_FILTER: RobustConfig = RobustConfig { hypotheses: MORE as u8, ..reference::FILTER };
+const LARGE_FILTER: RobustConfig = reference::FILTER.with_hypotheses(MORE as u8);
 
 /// The filters share one memory: together they do not fit.
 #[allow(clippy::large_enum_variant)]

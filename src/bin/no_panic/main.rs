@@ -4,8 +4,6 @@
 //! Its panic handler calls a function that does not exist, so a panic path that the optimiser does not remove is an undefined
 //! symbol. Build it with `cargo firmware --profile proof --bin no_panic`; it is never run. `--cfg teeth` adds a function that
 //! can panic, to show that the proof can fail.
-#![no_std]
-#![no_main]
 
 use core::{hint::black_box, panic::PanicInfo};
 

@@ -5,7 +5,7 @@ use core::hint::black_box;
 use static_cell::ConstStaticCell;
 use toposlam::{Map, PerVertex, VertexSet, VerticesFull};
 
-use crate::any::{any_fingerprint, any_vertex, show};
+use super::any::{any_fingerprint, any_vertex, show};
 
 const VERTICES: usize = 16;
 

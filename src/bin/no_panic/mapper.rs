@@ -10,8 +10,8 @@ use toposlam::{
     wire::{Reporter, map_digest},
 };
 
-use crate::any::{Opaque, any_answer, any_frame, any_turn, discard, show};
-use crate::robust::robust;
+use super::any::{Opaque, any_answer, any_frame, any_turn, discard, show};
+use super::robust::robust;
 
 const VERTICES: usize = 16;
 

@@ -8,7 +8,7 @@ use toposlam::{
     NgramsFull, PaperFilter, Prior,
 };
 
-use crate::any::{Opaque, any_fingerprint, any_length, show};
+use super::any::{Opaque, any_fingerprint, any_length, show};
 
 const PARTICLES: usize = 10;
 const VERTICES: usize = 16;

@@ -9,7 +9,7 @@ use toposlam::{
     ring::RingGeometry,
 };
 
-use crate::any::{Opaque, any_frame, show};
+use super::any::{Opaque, any_frame, show};
 
 pub(crate) fn place() {
     static DETECTOR: ConstStaticCell<PlaceDetector<16>> = ConstStaticCell::new(PlaceDetector::new());

@@ -19,7 +19,7 @@ use toposlam::{
     ring::{Echo, RingFrame},
 };
 
-use crate::any::{Opaque, show};
+use super::any::{Opaque, show};
 
 struct AnyLine;
 
@@ -161,14 +161,14 @@ fn i2c_rings(mut bus: impl I2c) {
         }
     }
     let config = if black_box(true) { Srf08Config::default() } else { Srf08Config::SRF10 };
-    match Srf08Ring::<_, _, 16>::new(&mut bus, AnyDelay, Srf08Config { plan: any_plan(), ..config }.opaque()) {
+    match Srf08Ring::<_, _, 16>::new(&mut bus, AnyDelay, config.with_plan(any_plan()).opaque()) {
         Ok(mut ring) => {
             read(&mut ring);
             ring.release().1.delay_ms(1);
         }
         Err(error) => show::<toposlam::ConfigError>(error),
     }
-    let config = MaxBotixConfig { plan: any_plan(), ..MaxBotixConfig::default() };
+    let config = MaxBotixConfig::default().with_plan(any_plan());
     match MaxBotixRing::<_, _, 16>::new(bus, AnyDelay, config.opaque()) {
         Ok(mut ring) => read(&mut ring),
         Err(error) => show::<toposlam::ConfigError>(error),
@@ -177,7 +177,7 @@ fn i2c_rings(mut bus: impl I2c) {
 
 fn pin_ring() {
     let pins = core::array::from_fn(|_| (AnyPin, AnyPin));
-    let config = HcSr04Config { plan: any_plan(), ..HcSr04Config::default() };
+    let config = HcSr04Config::default().with_plan(any_plan());
     match HcSr04Ring::<_, _, _, _, 16>::new(pins, AnyClock, AnyDelay, config.opaque()) {
         Ok(mut ring) => {
             read(&mut ring);

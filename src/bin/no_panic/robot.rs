@@ -14,7 +14,7 @@ use toposlam::robot::{Board, SaveError};
 use toposlam::wire::QueueFull;
 use toposlam::{FaultCounters, VertexId};
 
-use crate::any::{Opaque, any_frame, show};
+use super::any::{Opaque, any_frame, show};
 
 /// A board whose answers are hidden from the optimiser.
 struct Any;

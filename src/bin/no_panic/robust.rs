@@ -9,7 +9,7 @@ use toposlam::{
     persist::snapshot::{FILTER_SECTION, Snapshot, Writer},
 };
 
-use crate::any::{Opaque, any_fingerprint, any_turn, any_vertex, discard, show};
+use super::any::{Opaque, any_fingerprint, any_turn, any_vertex, discard, show};
 
 pub(crate) fn robust_filter() {
     static LARGE: ConstStaticCell<RobustFilter<3, 32, 32>> = ConstStaticCell::new(RobustFilter::new());

@@ -12,7 +12,7 @@ use toposlam::{
     },
 };
 
-use crate::any::{Opaque, any_frame, show};
+use super::any::{Opaque, any_frame, show};
 
 pub(crate) fn wire() {
     static BYTES: ConstStaticCell<[u8; MAX_FRAME_BYTES]> = ConstStaticCell::new([0; MAX_FRAME_BYTES]);

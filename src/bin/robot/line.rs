@@ -12,7 +12,7 @@ use stm32f4xx_hal::pac::{self, interrupt};
 use stm32f4xx_hal::serial::{Rx, RxListen, Serial, Tx};
 use toposlam::wire::QueueFull;
 
-use crate::frame_queue::{TransmitQueue, push_frame};
+use super::frame_queue::{TransmitQueue, push_frame};
 
 /// More than the robot reads in one step of its main loop.
 const RECEIVE_BYTES: usize = 512;

@@ -3,8 +3,6 @@
 //! This file connects the board to `toposlam::robot`, in this order: the `Board` implementation, then `main` (clocks, line,
 //! sonars, wheels, store, main loop), then helpers. `docs/firmware.md` lists the pins, `docs/porting.md` the steps for another
 //! board. The same image runs on the chip and in the emulator; only a fault uses semihosting.
-#![no_std]
-#![no_main]
 
 mod bridge_uart;
 mod clock;
@@ -40,7 +38,7 @@ use toposlam::{
     persist::store::{BootPolicy, Store},
     reference::{ROBOT, ReferenceRobot, SNAPSHOT_BYTES, SONARS, STORE},
     ring::drivers::{Sc18im700, SonarRing, Srf08Config, Srf08Ring},
-    robot::{Board, RobotConfig, SaveError},
+    robot::{Board, SaveError},
     wire::{QueueFull, ResetCause},
 };
 
@@ -145,7 +143,7 @@ fn main() -> ! {
     let flash = FLASH.init(LockedFlash::new(device.FLASH));
     let mut store = if is_emulated { None } else { Store::mount(flash.unlocked(), STORE).ok() };
     let boot = store.as_mut().and_then(|store| store.count_start().ok()).unwrap_or(0);
-    let config = RobotConfig { boot, reset_cause, ..ROBOT };
+    let config = ROBOT.with_boot(boot).with_reset_cause(reset_cause);
     let robot = ROBOT_CELL.take();
     let started = match &mut store {
         Some(store) => robot.boot(&config, SNAPSHOT.take(), store, BootPolicy::default()).map(|_| ()),

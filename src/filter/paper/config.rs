@@ -1,9 +1,11 @@
 //! The parameters of the paper's filter.
 
+use crate::setters::setters;
 use crate::{ConfigError, Direction, NgramLength};
 
 /// The parameters of the paper's filter. The defaults are the paper's where it gives them.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub struct Config {
     /// `n`: how many labels an n-gram has, 2 to 7. Default 5 (Section IV).
     pub ngram_length: u8,
@@ -27,6 +29,15 @@ impl Default for Config {
 }
 
 impl Config {
+    setters! {
+        with_ngram_length, ngram_length: u8;
+        with_particles, particles: u8;
+        with_penalty_permille, penalty_permille: u16;
+        with_sigma_label_mm, sigma_label_mm: u16;
+        with_sigma_consistency_mm, sigma_consistency_mm: u16;
+        with_direction, direction: Direction;
+    }
+
     /// The defaults.
     pub const DEFAULT: Self = Self {
         ngram_length: 5,

@@ -1,9 +1,11 @@
 //! The parameters of the robust filter.
 
 use crate::ConfigError;
+use crate::setters::setters;
 
 /// The parameters of the robust filter. The defaults were chosen on random families of environments (docs/evaluation.md).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub struct RobustConfig {
     /// How many distinct hypotheses are kept, 1 to the filter's capacity. Default 10.
     pub hypotheses: u8,
@@ -22,6 +24,15 @@ pub struct RobustConfig {
 }
 
 impl RobustConfig {
+    setters! {
+        with_hypotheses, hypotheses: u8;
+        with_noise_mm, noise_mm: u16;
+        with_resolution_mm, resolution_mm: u16;
+        with_moves, moves: u8;
+        with_wrong_turn_permille, wrong_turn_permille: u16;
+        with_wrong_degree_permille, wrong_degree_permille: u16;
+    }
+
     /// The defaults.
     pub const DEFAULT: Self = Self {
         hypotheses: 10,

@@ -24,6 +24,7 @@
 //! # Ok::<(), toposlam::persist::snapshot::SnapshotError>(())
 //! ```
 
+use crate::setters::setters;
 mod reader;
 mod writer;
 
@@ -100,12 +101,17 @@ pub enum Resume {
 
 /// When snapshots are made.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub struct SnapshotPolicy {
     /// A snapshot with every so many places; 0 for none at all. Default 25.
     pub every_places: u16,
 }
 
 impl SnapshotPolicy {
+    setters! {
+        with_every_places, every_places: u16;
+    }
+
     /// The defaults.
     pub const DEFAULT: Self = Self { every_places: 25 };
 

@@ -5,6 +5,7 @@
 //! echo it falls after about 38 ms; some clones take longer, and some hold the line high permanently. Two measurements are
 //! at least 60 ms apart, so that the sound decays.
 
+use crate::setters::setters;
 use embedded_hal::{
     delay::DelayNs,
     digital::{InputPin, OutputPin},
@@ -28,6 +29,7 @@ pub trait MicrosecondClock {
 
 /// Firing plan, times and range limits of a ring of HC-SR04.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub struct HcSr04Config<const SONARS: usize> {
     /// Which sensors fire together. Default: four groups, so that in a ring of 16 those that fire together are 90° apart.
     pub plan: FiringPlan<SONARS>,
@@ -53,6 +55,18 @@ pub struct HcSr04Config<const SONARS: usize> {
 }
 
 impl<const SONARS: usize> HcSr04Config<SONARS> {
+    setters! {
+        with_plan, plan: FiringPlan<SONARS>;
+        with_trigger_us, trigger_us: u8;
+        with_rise_timeout_us, rise_timeout_us: u16;
+        with_echo_timeout_us, echo_timeout_us: u16;
+        with_cycle_ms, cycle_ms: u8;
+        with_stopped_clock_polls, stopped_clock_polls: u16;
+        with_speed_of_sound_m_per_s, speed_of_sound_m_per_s: u16;
+        with_min_range_mm, min_range_mm: u16;
+        with_max_range_mm, max_range_mm: u16;
+    }
+
     /// The values of the data sheet, four firing groups.
     pub const DEFAULT: Self = Self {
         plan: FiringPlan::interleaved(4),

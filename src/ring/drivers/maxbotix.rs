@@ -4,6 +4,7 @@
 //! does not acknowledge its address. About 80 ms later a read returns two bytes, the range in centimetres, high byte first:
 //! 20 to 765, where 765 means no echo. Two measurements are at least 100 ms apart, so that the sound decays.
 
+use crate::setters::setters;
 use embedded_hal::i2c::I2c;
 
 use super::{FiringPlan, I2cRanger, I2cRing, RangingTiming, Reading, SonarFault, i2c_ring::check_addresses};
@@ -21,6 +22,7 @@ pub(super) const fn is_address(address: u8) -> bool {
 
 /// Addresses, firing plan and times of a ring of I2CXL-MaxSonar.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub struct MaxBotixConfig<const SONARS: usize> {
     /// 7-bit address of sensor 0; sensor *i* has this address plus *i*. All addresses must be from 0x08 to 0x7F, except 0x28,
     /// 0x52 and 0x55. Default 0x70, for at most 16 sensors.
@@ -35,6 +37,13 @@ pub struct MaxBotixConfig<const SONARS: usize> {
 }
 
 impl<const SONARS: usize> MaxBotixConfig<SONARS> {
+    setters! {
+        with_first_address, first_address: u8;
+        with_plan, plan: FiringPlan<SONARS>;
+        with_ranging_ms, ranging_ms: u8;
+        with_cycle_ms, cycle_ms: u8;
+    }
+
     /// The values of the data sheet, two firing groups.
     pub const DEFAULT: Self =
         Self { first_address: 0x70, plan: FiringPlan::interleaved(2), ranging_ms: 80, cycle_ms: 100 };

@@ -5,6 +5,7 @@
 //! drive the bus, so the revision reads as 255. Register 1 is the light sensor (the SRF10 has none). Registers 2 and 3 are
 //! the first echo, high byte first, 0 without an echo. A command to address 0 starts every SRF08 on the bus.
 
+use crate::setters::setters;
 use core::ops::RangeInclusive;
 
 use embedded_hal::i2c::I2c;
@@ -27,6 +28,7 @@ pub(super) const ADDRESSES: RangeInclusive<u8> = 0x70..=0x7F;
 
 /// Addresses, firing plan, times and range limits of a ring of SRF08 or SRF10.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub struct Srf08Config<const SONARS: usize> {
     /// 7-bit address of sensor 0, 0x70 to 0x7F; sensor *i* has this address plus *i*. Default 0x70.
     pub first_address: u8,
@@ -48,6 +50,17 @@ pub struct Srf08Config<const SONARS: usize> {
 }
 
 impl<const SONARS: usize> Srf08Config<SONARS> {
+    setters! {
+        with_first_address, first_address: u8;
+        with_plan, plan: FiringPlan<SONARS>;
+        with_has_general_call, has_general_call: bool;
+        with_timeout_ms, timeout_ms: u16;
+        with_poll_interval_us, poll_interval_us: u16;
+        with_speed_of_sound_m_per_s, speed_of_sound_m_per_s: u16;
+        with_min_range_mm, min_range_mm: u16;
+        with_max_range_mm, max_range_mm: u16;
+    }
+
     /// The values of the SRF08's data sheet, two firing groups.
     pub const DEFAULT: Self = Self {
         first_address: 0x70,

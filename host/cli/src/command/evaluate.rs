@@ -260,7 +260,7 @@ impl CourseArguments {
         let lengths: Vec<usize> = self.lengths.iter().map(|length| length.get()).collect();
         ensure!(lengths.is_sorted_by(|shorter, longer| shorter < longer), "--lengths: must be in ascending order");
         let filter = match filter {
-            Filter::Paper(config) => Filter::Paper(Config { ngram_length: self.ngram_length, ..config }),
+            Filter::Paper(config) => Filter::Paper(config.with_ngram_length(self.ngram_length)),
             Filter::Robust(config) => Filter::Robust(config),
         };
         Ok(Settings {
@@ -313,29 +313,29 @@ impl FilterArguments {
 
     fn robust(&self) -> Filter {
         let default = RobustConfig::DEFAULT;
-        Filter::Robust(RobustConfig {
-            hypotheses: self.hypotheses.unwrap_or(default.hypotheses),
-            noise_mm: self.noise_mm.unwrap_or(default.noise_mm),
-            moves: self.moves.unwrap_or(default.moves),
-            wrong_turn_permille: self.wrong_turn.unwrap_or(default.wrong_turn_permille),
-            wrong_degree_permille: self.wrong_degree.unwrap_or(default.wrong_degree_permille),
-            ..default
-        })
+        Filter::Robust(
+            default
+                .with_hypotheses(self.hypotheses.unwrap_or(default.hypotheses))
+                .with_noise_mm(self.noise_mm.unwrap_or(default.noise_mm))
+                .with_moves(self.moves.unwrap_or(default.moves))
+                .with_wrong_turn_permille(self.wrong_turn.unwrap_or(default.wrong_turn_permille))
+                .with_wrong_degree_permille(self.wrong_degree.unwrap_or(default.wrong_degree_permille)),
+        )
     }
 
     fn paper(&self) -> Filter {
         let default = Config::DEFAULT;
-        Filter::Paper(Config {
-            particles: self.hypotheses.unwrap_or(default.particles),
-            penalty_permille: self.penalty.unwrap_or(default.penalty_permille),
-            sigma_label_mm: self.sigma_label_mm.unwrap_or(default.sigma_label_mm),
-            sigma_consistency_mm: self.sigma_consistency_mm.unwrap_or(default.sigma_consistency_mm),
-            direction: match self.consistency {
-                None | Some(ConsistencyChoice::TwoSided) => Direction::TwoSided,
-                Some(ConsistencyChoice::MapToHistory) => Direction::MapToHistory,
-                Some(ConsistencyChoice::HistoryToMap) => Direction::HistoryToMap,
-            },
-            ..default
-        })
+        Filter::Paper(
+            default
+                .with_particles(self.hypotheses.unwrap_or(default.particles))
+                .with_penalty_permille(self.penalty.unwrap_or(default.penalty_permille))
+                .with_sigma_label_mm(self.sigma_label_mm.unwrap_or(default.sigma_label_mm))
+                .with_sigma_consistency_mm(self.sigma_consistency_mm.unwrap_or(default.sigma_consistency_mm))
+                .with_direction(match self.consistency {
+                    None | Some(ConsistencyChoice::TwoSided) => Direction::TwoSided,
+                    Some(ConsistencyChoice::MapToHistory) => Direction::MapToHistory,
+                    Some(ConsistencyChoice::HistoryToMap) => Direction::HistoryToMap,
+                }),
+        )
     }
 }

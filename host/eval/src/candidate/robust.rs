@@ -38,7 +38,7 @@ impl<const N: usize, const HISTORY: usize> Robust<N, HISTORY> {
         let config = if let Filter::Robust(config) = settings.filter { config } else { RobustConfig::DEFAULT };
         // Coarser fingerprints have wider steps.
         let resolution_mm = Fingerprint::STEP_MM << Fingerprint::BITS.saturating_sub(settings.fingerprint_bits);
-        let config = RobustConfig { resolution_mm: resolution_mm.min(1000), ..config };
+        let config = config.with_resolution_mm(resolution_mm.min(1000));
         let started = filter.start(config, trial.filter_seed);
         assert!(started.is_ok(), "the configuration was checked");
         Box::new(Self(filter))

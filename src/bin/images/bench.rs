@@ -1,0 +1,13 @@
+//! The bench image (`src/bin/bench/main.rs`). On any other target than the board's it is a program that says so, so that
+//! `cargo build --all-features` works on a host.
+#![cfg_attr(target_os = "none", no_std, no_main)]
+
+#[cfg(target_os = "none")]
+#[path = "../bench/main.rs"]
+mod image;
+
+#[cfg(not(target_os = "none"))]
+fn main() -> std::process::ExitCode {
+    eprintln!("this image runs on the reference board only; build it with `cargo firmware --bin bench`");
+    std::process::ExitCode::FAILURE
+}

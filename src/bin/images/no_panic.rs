@@ -1,0 +1,13 @@
+//! The no-panic proof (`src/bin/no_panic/main.rs`). On any other target than the board's it is a program that says so, so that
+//! `cargo build --all-features` works on a host.
+#![cfg_attr(target_os = "none", no_std, no_main)]
+
+#[cfg(target_os = "none")]
+#[path = "../no_panic/main.rs"]
+mod image;
+
+#[cfg(not(target_os = "none"))]
+fn main() -> std::process::ExitCode {
+    eprintln!("this image runs on the reference board only; build it with `cargo firmware --bin no_panic`");
+    std::process::ExitCode::FAILURE
+}
