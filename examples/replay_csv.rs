@@ -1,0 +1,57 @@
+//! A map from recorded ring frames: place detection and filter.
+//!
+//! `frames.csv` has a column for each of 16 sensors, counter-clockwise from straight ahead, and a line for each ring frame.
+//! A value is a range in millimetres, `silence` (no echo) or `dead` (no answer).
+//!
+//! ```sh
+//! cargo run --example replay_csv
+//! ```
+
+use toposlam::ring::{Echo, RingFrame, RingGeometry};
+use toposlam::{Mapper, MapperConfig, RobustFilter};
+
+const FRAMES: &str = include_str!("frames.csv");
+const SONARS: usize = 16;
+
+fn main() -> Result<(), Box<dyn std::error::Error>> {
+    let mut mapper = Box::new(Mapper::<SONARS, 16, RobustFilter<10, 16, 400>>::new());
+    mapper.start(&MapperConfig::for_ring(RingGeometry::even()))?;
+
+    for line in FRAMES.lines().skip(1) {
+        // The recording does not say how the robot left each place. A robot that knows passes it instead of `None`.
+        if let Some((place, update)) = mapper.observe(&frame(line)?, None) {
+            println!(
+                "frame {:3}: place {} of radius {} mm is vertex {}{}",
+                place.frame_index,
+                update.place_index,
+                place.fingerprint.radius_mm(),
+                update.vertex,
+                if update.is_new { ", new" } else { "" },
+            );
+        }
+    }
+
+    let map = mapper.map();
+    println!("{} vertices, {} edges", map.vertices().len(), map.edges().count());
+    assert_eq!(mapper.filter().observed(), 9);
+    assert!(mapper.faults() == toposlam::FaultCounters::new(), "{:?}", mapper.faults());
+    Ok(())
+}
+
+/// Parses one line of the file.
+fn frame(line: &str) -> Result<RingFrame<SONARS>, Box<dyn std::error::Error>> {
+    let mut echoes = [Echo::Dead; SONARS];
+    for (echo, value) in echoes.iter_mut().zip(line.split(',')) {
+        *echo = match value {
+            "silence" => Echo::Silence,
+            "dead" => Echo::Dead,
+            range_mm => Echo::Range { range_mm: range_mm.parse()? },
+        };
+    }
+    Ok(RingFrame { echoes })
+}
+
+#[test]
+fn the_example_finds_every_place() {
+    main().unwrap();
+}
