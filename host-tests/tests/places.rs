@@ -9,25 +9,25 @@ use toposlam::place::{Place, PlaceConfig, PlaceDetector};
 use toposlam::reference;
 use toposlam::ring::{Echo, RingFrame};
 use toposlam::{FaultKind, Turn};
-use toposlam_eval::recording::Ring;
-use toposlam_sim::world::{Journal, Plan, Report, RobotModel, SONARS, Simulation, SonarModel};
+use toposlam_eval::range_csv::Ring;
+use toposlam_sim::world::{GroundTruth, Plan, Report, RobotModel, SONARS, Simulation, SonarModel};
 
 /// Drives until `visits` nodes were visited.
 fn drive(plan: &str, model: RobotModel, seed: u64, visits: usize) -> (Report, Vec<Place>) {
     let plan = Plan::built_in(plan).unwrap();
     let mut simulation = Simulation::new(&plan, model, seed).unwrap();
-    let mut journal = Journal::new(simulation.true_map());
+    let mut ground_truth = GroundTruth::new(simulation.true_map());
     let mut detector = PlaceDetector::<SONARS>::new();
     detector.start(PlaceConfig::DEFAULT, reference::RING).unwrap();
-    while journal.visits() < visits {
+    while ground_truth.visits() < visits {
         let (frame, truth) = simulation.next().unwrap();
-        journal.drive(&truth);
+        ground_truth.drive(&truth);
         if let Some(place) = detector.observe(&frame) {
-            journal.detect(&place);
+            ground_truth.detect(&place);
         }
     }
     assert_eq!(detector.faults().count(FaultKind::RingBlind), 0);
-    (journal.report(), journal.detections().iter().map(|detection| detection.place).collect())
+    (ground_truth.report(), ground_truth.detections().iter().map(|detection| detection.place).collect())
 }
 
 /// At the default noise every visit is detected exactly once; at twice the noise at most three of 40 are wrong.
@@ -59,19 +59,19 @@ fn places_of_the_flat_are_found_once() {
 fn the_turn_hint_of_the_drive_is_right_at_every_place() {
     let plan = Plan::built_in("office").unwrap();
     let mut simulation = Simulation::new(&plan, RobotModel::default(), 7).unwrap();
-    let mut journal = Journal::new(simulation.true_map());
+    let mut ground_truth = GroundTruth::new(simulation.true_map());
     let mut detector = PlaceDetector::<SONARS>::new();
     detector.start(PlaceConfig::DEFAULT, reference::RING).unwrap();
     let mut turns = Vec::new();
     while turns.len() < 80 {
         let (frame, truth) = simulation.next().unwrap();
-        journal.drive(&truth);
+        ground_truth.drive(&truth);
         if let Some(place) = detector.observe(&frame) {
-            journal.detect(&place);
+            ground_truth.detect(&place);
             turns.push(truth.turn);
         }
     }
-    let nodes: Vec<_> = journal.detections().iter().map(|detection| detection.node.unwrap()).collect();
+    let nodes: Vec<_> = ground_truth.detections().iter().map(|detection| detection.node.unwrap()).collect();
     for (index, nodes) in nodes.windows(3).enumerate() {
         let expected = if nodes[0] == nodes[2] { Turn::Back } else { Turn::On };
         assert_eq!(turns[index + 2], Some(expected), "place {}", index + 2);

@@ -1,4 +1,4 @@
-//! The `toposlam` command: one subcommand for each thing a person does with a robot or without one.
+//! The `toposlam` command: its subcommands.
 
 mod command;
 
@@ -14,39 +14,38 @@ struct Arguments {
 
 #[derive(Subcommand)]
 enum Task {
-    /// Let a simulated robot explore a floor plan, and map it on this computer.
+    /// Simulate a robot that explores a floor plan, and print and draw its map.
     Simulate(command::simulate::Arguments),
-    /// Let many simulated robots explore floor plans, and count right maps and journeys that arrive.
+    /// Simulate many explorations, and count exact maps and reached goals.
     Explore(command::explore::Arguments),
-    /// Do the same as `simulate` with the firmware in an emulated STM32F405, and compare the maps bit for bit.
+    /// Run the firmware in an emulated STM32F405, and compare its map with that of `simulate` bit for bit.
     Emulate(command::emulate::Arguments),
-    /// Let a simulated robot live for hours with faults and an operator, and hold what it counts to what was done to it.
+    /// Simulate a robot for hours with injected faults and an operator, and check its fault counters.
     Soak(command::soak::Arguments),
-    /// Map a recording of ring ranges.
+    /// Map a CSV file of recorded ring ranges.
     Replay(command::replay::Arguments),
-    /// Measure how often the maps of many random paths are right.
+    /// Measure how often maps are exact, over random paths through known environments.
     Evaluate(command::evaluate::Arguments),
-    /// Be a simulated robot at the other end of a TCP line.
+    /// Run a simulated robot that serves its line at a TCP port.
     Robot(command::robot::Arguments),
-    /// Keep what a robot on a line says in an MCAP file.
+    /// Record the line of a robot in an MCAP file (feature `recording`).
     Record(command::record::Arguments),
-    /// Hear a recording of `record` again, or let others hear it.
+    /// Play a recording back, or serve it as a robot (feature `recording`).
     Play(command::play::Arguments),
-    /// Watch a robot on a line live, and tell it what to do.
+    /// Monitor and command a robot in the terminal.
     Monitor(command::monitor::Arguments),
-    /// Write a robot's map in a format of other programs.
+    /// Export a robot's map as GraphML, DOT, GeoJSON, JSON or SVG.
     Export(command::export::Arguments),
-    /// Listen to many robots at once, and say what that costs.
+    /// Monitor many robots in one thread, and measure the cost.
     Fleet(command::fleet::Arguments),
-    /// Be many recorded robots at the other end of a TCP port.
+    /// Serve many recorded robots at one TCP port.
     #[command(hide = true)]
     Robots(command::robots::Arguments),
-    /// Tell an MQTT broker all that a robot on a line says.
-    #[cfg(feature = "mqtt")]
+    /// Publish a robot's messages and map to an MQTT broker (feature `mqtt`).
     Publish(command::publish::Arguments),
-    /// Show the live map of a robot on a line in browsers.
+    /// Serve a web page with a robot's live map.
     Serve(command::serve::Arguments),
-    /// Tell a robot on a line what to do.
+    /// Send one command to a robot.
     Command(command::console::Arguments),
 }
 
@@ -65,7 +64,6 @@ fn main() -> anyhow::Result<()> {
         Task::Export(arguments) => command::export::run(&arguments),
         Task::Fleet(arguments) => command::fleet::run(&arguments),
         Task::Robots(arguments) => command::robots::run(&arguments),
-        #[cfg(feature = "mqtt")]
         Task::Publish(arguments) => command::publish::run(&arguments),
         Task::Serve(arguments) => command::serve::run(&arguments),
         Task::Command(arguments) => command::console::run(&arguments),

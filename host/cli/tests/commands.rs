@@ -199,7 +199,7 @@ fn command_says_why_a_robot_did_not_do_it() {
     let line = format!("tcp:{}", listener.local_addr().unwrap());
     let silent = ["command", "--timeout-ms", "10", "--attempts", "2", &line, "info"];
     let text = complaint(&toposlam(&silent));
-    assert!(text.contains("did not answer 2 requests"), "{text}");
+    assert!(text.contains("no reply to 2 requests"), "{text}");
     let text = complaint(&toposlam(&["command", &line, "set", "no-such-setting", "1"]));
     assert!(text.contains("noise-mm"), "the settings are listed: {text}");
 }
@@ -215,10 +215,26 @@ fn export_writes_the_map_of_a_recording_and_says_what_is_wrong_with_it() {
     std::fs::write(&file, &edge).unwrap();
     let output = toposlam(&["export", name, "--format", "graphml"]);
     assert!(printed(&output).contains("<edge source=\"0\" target=\"1\"/>"));
-    assert!(String::from_utf8_lossy(&output.stderr).contains("not heard whole"));
+    assert!(String::from_utf8_lossy(&output.stderr).contains("the map is incomplete"));
 
     std::fs::write(&file, b"no robot").unwrap();
-    assert!(complaint(&toposlam(&["export", name, "--format", "svg"])).contains("no map was heard"));
+    assert!(complaint(&toposlam(&["export", name, "--format", "svg"])).contains("no map received"));
     assert!(complaint(&toposlam(&["export", name, "--format", "png"])).contains("graphml, dot, geojson, json, svg"));
     assert!(complaint(&toposlam(&["export", name, "--format", "geojson", "--edge-m", "0"])).contains("0.1 to 1000"));
+}
+
+#[cfg(not(all(feature = "mqtt", feature = "recording")))]
+#[test]
+fn a_command_that_the_build_leaves_out_names_its_feature() {
+    for (command, feature, is_built) in [
+        ("record", "recording", cfg!(feature = "recording")),
+        ("play", "recording", cfg!(feature = "recording")),
+        ("publish", "mqtt", cfg!(feature = "mqtt")),
+    ] {
+        if !is_built {
+            let text = complaint(&toposlam(&[command, "tcp:127.0.0.1:7070", "--seconds", "3"]));
+            let expected = format!("--features {feature} -- {command} tcp:127.0.0.1:7070 --seconds 3");
+            assert!(text.contains(&expected), "{text}");
+        }
+    }
 }

@@ -72,7 +72,7 @@ fn the_report_has_the_documented_keys_and_shares_between_0_and_1() {
         let report = report(&[cases.as_slice(), &course].concat(), "2");
         let settings = json!({
             "seed": 1, "prior": "none", "hints": "none", "fingerprint_bits": 12, "ngram_length": 5,
-            "polish": 10, "polish_prior": 10, "search_from_truth": 0,
+            "refinement_steps": 10, "prior_refinement_steps": 10, "search_from_truth": 0,
             "filters": { filter: parameters },
         });
         assert_eq!(report["settings"], settings);
@@ -151,9 +151,9 @@ fn the_same_seed_gives_the_same_report_on_any_number_of_threads() {
                 "4",
                 "--length",
                 "12",
-                "--polish",
+                "--refinement-steps",
                 "1",
-                "--polish-prior",
+                "--prior-refinement-steps",
                 "0",
             ];
             let more = ["--filter", filter, "--prior", prior, "--hints", "both,missing=0.2,wrong=0.1"];
@@ -207,7 +207,10 @@ fn the_table_tells_the_seed_and_names_every_row() {
     let table = String::from_utf8(output.stdout).unwrap();
     let lines: Vec<&str> = table.lines().collect();
     assert_eq!(lines.len(), 6);
-    assert!(lines[0].starts_with("seed 5, prior none, hints none, 12 bits, n = 5, 10 slices; robust: hypotheses 10"));
+    assert!(
+        lines[0]
+            .starts_with("seed 5, prior none, hints none, 12 bits, n = 5, 10 refinement steps; robust: hypotheses 10")
+    );
     assert!(lines[1].starts_with("name "));
     assert!(lines[2].starts_with("table-i ") && lines[3].starts_with("table-i "));
     assert!(lines[5].starts_with(&format!("family {FAMILY} robust")));
@@ -311,10 +314,10 @@ fn what_cannot_be_evaluated_is_refused_with_its_reason() {
         ),
         (&["--filter", "paper", "--length", "5000"], "may visit at most 2048 places"),
         (&["--length", "20000"], "may visit at most 16384 places"),
-        (&["--filter", "paper", "--particles", "200"], "particles is out of its range"),
-        (&["--hypotheses", "200"], "hypotheses is out of its range"),
-        (&["--noise-mm", "0"], "noise_mm is out of its range"),
-        (&["--wrong-turn", "0.9"], "wrong_turn_permille is out of its range"),
+        (&["--filter", "paper", "--particles", "200"], "particles is 200, but must be from 1 to 100"),
+        (&["--hypotheses", "200"], "hypotheses is 200, but must be"),
+        (&["--noise-mm", "0"], "noise_mm is 0, but must be"),
+        (&["--wrong-turn", "0.9"], "wrong_turn_permille is 900, but must be"),
         (&["--wrong-degree", "0.0005"], "--wrong-degree"),
         (&["--ngram-length", "8"], "--ngram-length"),
         (&["--filter", "paper", "--penalty", "1"], "--penalty"),

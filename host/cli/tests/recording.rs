@@ -1,10 +1,12 @@
 //! `record` and `play` as a person meets them: how a recording ends, and that it can be heard like a robot.
 
+#![cfg(feature = "recording")]
+
 use std::io::{BufRead, BufReader, Read};
 use std::path::Path;
 use std::process::{Child, Command, Stdio};
 
-use toposlam_link::log::{Recording, TimedFrame};
+use toposlam_link::recording::{Recording, TimedFrame};
 
 fn toposlam(arguments: &[&str]) -> Command {
     let mut command = Command::new(env!("CARGO_BIN_EXE_toposlam"));

@@ -43,7 +43,7 @@ pub struct Judgement {
     /// Whether a long search that starts at the true path ends in another map, which then has the better score; `None` when
     /// there was no search.
     pub leaves_truth: Option<bool>,
-    /// How long the filter took for the places so far, polishing included.
+    /// How long the filter took for the places so far, refinement included.
     pub filter_time: Duration,
 }
 
@@ -53,7 +53,7 @@ pub fn judge(trial: &Trial, settings: &Settings, start: Start) -> PathResult {
     let started = Instant::now();
     for visit in trial.mapped_before().iter().flatten() {
         candidate.observe(visit.observation);
-        candidate.polish(settings.polish_prior);
+        candidate.refine(settings.prior_refinement_steps);
     }
     let prior_time = started.elapsed();
 
@@ -67,7 +67,7 @@ pub fn judge(trial: &Trial, settings: &Settings, start: Start) -> PathResult {
     for (step, visit) in trial.visits.iter().enumerate() {
         let start = Instant::now();
         if step > 0 {
-            candidate.polish(settings.polish);
+            candidate.refine(settings.refinement_steps);
         }
         candidate.observe(visit.observation);
         filter_time += start.elapsed();
@@ -103,9 +103,9 @@ pub fn judge(trial: &Trial, settings: &Settings, start: Start) -> PathResult {
     PathResult { exhaustive: trial.exhaustive, judgements, vertices_full, prior_time }
 }
 
-/// Whether a search of so many slices that starts at the true path ends in a map that is not the true one.
-fn leaves_truth(candidate: &dyn Candidate, truth: &Truth, before: usize, slices: u32) -> Option<bool> {
-    if slices == 0 {
+/// Whether a search of `steps` refinement steps from the true path ends in another map.
+fn leaves_truth(candidate: &dyn Candidate, truth: &Truth, before: usize, steps: u32) -> Option<bool> {
+    if steps == 0 {
         return None;
     }
     // The filter numbers vertices by first visit.
@@ -121,7 +121,7 @@ fn leaves_truth(candidate: &dyn Candidate, truth: &Truth, before: usize, slices:
             VertexId::new(u8::try_from(number).ok()?)
         })
         .collect::<Option<_>>()?;
-    let (map, path) = candidate.search_from(&path, slices)?;
+    let (map, path) = candidate.search_from(&path, steps)?;
     Some(!score_map_from(&graph_of(&map), &path, &truth.graph, &truth.classes, before).exact)
 }
 
@@ -200,9 +200,9 @@ mod tests {
             self.seen += 1;
         }
 
-        fn polish(&mut self, _slices: u32) {}
+        fn refine(&mut self, _steps: u32) {}
 
-        fn search_from(&self, _path: &[VertexId], _slices: u32) -> Option<(Map<VERTICES>, Vec<usize>)> {
+        fn search_from(&self, _path: &[VertexId], _steps: u32) -> Option<(Map<VERTICES>, Vec<usize>)> {
             None
         }
 
@@ -243,8 +243,8 @@ mod tests {
             seed: 1,
             filter: Filter::Robust(RobustConfig::DEFAULT),
             prior,
-            polish: 0,
-            polish_prior: 0,
+            refinement_steps: 0,
+            prior_refinement_steps: 0,
             search_from_truth: 0,
             hints: Default::default(),
             fingerprint_bits: 12,

@@ -4,7 +4,7 @@
 //! filter that maps it, and [`settings`] how much of what. [`judge`] brings them together, [`run`] does it for all paths, and
 //! [`report`] sums up.
 //!
-//! [`mapping`] makes a map of ring frames on this computer, from a simulation or from a [`recording`] of a real ring; [`nearness`] says
+//! [`mapping`] makes a map of ring frames on this computer, from a simulation or from a [`range_csv`] of a real ring; [`gvg_adherence`] says
 //! how near to the Voronoi graph a recorded robot drove, and [`laps`] compares the laps of a round. [`soak`] lets a simulated robot live
 //! with faults for hours.
 
@@ -15,16 +15,18 @@ pub mod environment;
 pub mod equivalence;
 pub mod export;
 pub mod family;
+pub mod faults;
 pub mod figure;
 pub mod graph;
+pub mod gvg_adherence;
 pub mod hints;
 pub mod judge;
 pub mod laps;
 pub mod mapping;
-pub mod nearness;
+pub mod parallel;
 mod planar;
 pub mod prior;
-pub mod recording;
+pub mod range_csv;
 pub mod report;
 pub mod run;
 pub mod score;

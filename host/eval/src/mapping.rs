@@ -1,30 +1,29 @@
 //! A map made on this computer by the very stages that run on the robot, with the log that a person wants of it.
 //!
 //! ```
-//! use toposlam::reference;
 //! use toposlam_eval::mapping::{FilterChoice, Mapping};
-//! use toposlam_sim::world::{Journal, Plan, RobotModel, Simulation};
+//! use toposlam_sim::world::{GroundTruth, Plan, RobotModel, Simulation};
 //!
 //! let plan = Plan::built_in("ring").expect("it is built in");
 //! let mut simulation = Simulation::new(&plan, RobotModel::default(), 7)?;
-//! let mut journal = Journal::new(simulation.true_map());
-//! let mut mapping = Mapping::start(reference::RING, FilterChoice::Robust)?;
+//! let mut ground_truth = GroundTruth::new(simulation.true_map());
+//! let mut mapping = Mapping::reference(FilterChoice::Robust)?;
 //! while mapping.steps().len() < 20 {
 //!     let (frame, truth) = simulation.next().expect("a simulation does not end");
-//!     journal.drive(&truth);
+//!     ground_truth.drive(&truth);
 //!     if let Some(step) = mapping.observe(&frame, truth.turn) {
-//!         journal.detect(&step.place);
+//!         ground_truth.detect(&step.place);
 //!     }
 //! }
-//! let nodes: Vec<Option<usize>> = journal.detections().iter().map(|detection| detection.node).collect();
+//! let nodes: Vec<Option<usize>> = ground_truth.detections().iter().map(|detection| detection.node).collect();
 //! assert!(mapping.score(simulation.true_map(), &nodes).location > 0.5);
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
+use toposlam::place::Place;
 use toposlam::reference::{self, PaperReference, VERTICES};
 use toposlam::ring::{RingFrame, RingGeometry};
-use toposlam::wire::{Belief, Worst};
-use toposlam::{ConfigError, FaultCounters, Filter, Map, Mapper, MapperConfig, Turn};
+use toposlam::{ConfigError, FaultCounters, Filter, Map, Mapper, MapperConfig, Turn, Update};
 
 use toposlam_sim::Step;
 use toposlam_sim::exploration::Exploration;
@@ -32,6 +31,7 @@ use toposlam_sim::world::TrueMap;
 
 use crate::ancestry::Ancestry;
 use crate::graph::Graph;
+use crate::range_csv::{Ring, SONARS_MAX};
 use crate::score::{MapScore, score_map};
 
 /// Which filter maps, with the settings of the reference robot.
@@ -43,37 +43,95 @@ pub enum FilterChoice {
     Paper,
 }
 
-/// The stages with one filter or the other; the paper's needs a log of its particles to tell their paths.
-enum Stages<const SONARS: usize> {
-    Robust(Box<Mapper<SONARS, VERTICES, reference::Filter>>),
-    Paper(Box<Mapper<SONARS, VERTICES, PaperReference>>, Ancestry),
+/// The robot's stages with one filter or the other, for a ring of `SONARS`. Behind a trait object, so that who uses a mapping does not
+/// compile the filters again.
+trait Stages<const SONARS: usize> {
+    fn observe(&mut self, frame: &RingFrame<SONARS>, turn: Option<Turn>) -> Option<(Place, Update)>;
+    fn map(&self) -> &Map<VERTICES>;
+    fn faults(&self) -> FaultCounters;
+    /// The vertices of the newest places.
+    fn path(&self) -> Vec<usize>;
 }
 
-/// Says the same of either mapper.
-macro_rules! either {
-    ($stages:expr, $mapper:ident => $answer:expr) => {
-        match $stages {
-            Stages::Robust($mapper) => $answer,
-            Stages::Paper($mapper, _) => $answer,
-        }
-    };
+/// The stages with the robust filter.
+struct Robust<const SONARS: usize>(Box<Mapper<SONARS, VERTICES, reference::Filter>>);
+
+impl<const SONARS: usize> Stages<SONARS> for Robust<SONARS> {
+    fn observe(&mut self, frame: &RingFrame<SONARS>, turn: Option<Turn>) -> Option<(Place, Update)> {
+        self.0.observe(frame, turn)
+    }
+
+    fn map(&self) -> &Map<VERTICES> {
+        self.0.map()
+    }
+
+    fn faults(&self) -> FaultCounters {
+        self.0.faults()
+    }
+
+    fn path(&self) -> Vec<usize> {
+        self.0.filter().path().map(usize::from).collect()
+    }
+}
+
+/// The stages with the paper's filter, whose particles need a log to have paths.
+struct Paper<const SONARS: usize>(Box<Mapper<SONARS, VERTICES, PaperReference>>, Ancestry);
+
+impl<const SONARS: usize> Stages<SONARS> for Paper<SONARS> {
+    fn observe(&mut self, frame: &RingFrame<SONARS>, turn: Option<Turn>) -> Option<(Place, Update)> {
+        let Self(mapper, ancestry) = self;
+        let observed = mapper.observe(frame, turn)?;
+        let particles = mapper.filter().particles().iter();
+        ancestry.advance(particles.map(|particle| (particle.parent.into(), particle.at.into())));
+        Some(observed)
+    }
+
+    fn map(&self) -> &Map<VERTICES> {
+        self.0.map()
+    }
+
+    fn faults(&self) -> FaultCounters {
+        self.0.faults()
+    }
+
+    fn path(&self) -> Vec<usize> {
+        let filter = self.0.filter();
+        let best = filter.particles().iter().position(|particle| std::ptr::eq(particle, filter.best()));
+        best.map_or(Vec::new(), |best| self.1.path(best).to_vec())
+    }
 }
 
 /// The robot's stages for a ring of `SONARS`, with the capacities of the reference robot, and their log.
 pub struct Mapping<const SONARS: usize> {
-    stages: Stages<SONARS>,
+    stages: Box<dyn Stages<SONARS>>,
     steps: Vec<Step>,
 }
 
-impl<const SONARS: usize> Mapping<SONARS> {
-    /// Starts a mapping with the settings of the reference robot, for a ring and with a filter.
+impl Mapping<{ reference::SONARS }> {
+    /// Starts a mapping with the ring and the settings of the reference robot.
     ///
     /// # Errors
     /// The first setting that is out of its range.
-    pub fn start(geometry: RingGeometry<SONARS>, filter: FilterChoice) -> Result<Self, ConfigError> {
-        let stages = match filter {
-            FilterChoice::Robust => Stages::Robust(started(geometry, reference::FILTER)?),
-            FilterChoice::Paper => Stages::Paper(started(geometry, reference::PAPER_FILTER)?, Ancestry::new()),
+    pub fn reference(filter: FilterChoice) -> Result<Self, ConfigError> {
+        Self::start(reference::RING, filter)
+    }
+}
+
+impl Mapping<SONARS_MAX> {
+    /// Starts a mapping for the ring of a recording, with the other settings of the reference robot.
+    ///
+    /// # Errors
+    /// The first setting that is out of its range.
+    pub fn of_recording(ring: &Ring, filter: FilterChoice) -> Result<Self, ConfigError> {
+        Self::start(ring.geometry(), filter)
+    }
+}
+
+impl<const SONARS: usize> Mapping<SONARS> {
+    fn start(geometry: RingGeometry<SONARS>, filter: FilterChoice) -> Result<Self, ConfigError> {
+        let stages: Box<dyn Stages<SONARS>> = match filter {
+            FilterChoice::Robust => Box::new(Robust(started(geometry, reference::FILTER)?)),
+            FilterChoice::Paper => Box::new(Paper(started(geometry, reference::PAPER_FILTER)?, Ancestry::new())),
         };
         Ok(Self { stages, steps: Vec::new() })
     }
@@ -81,11 +139,7 @@ impl<const SONARS: usize> Mapping<SONARS> {
     /// Takes one frame, and what the drive knows of how the robot left the place before; gives a step when the robot has
     /// just been at a place.
     pub fn observe(&mut self, frame: &RingFrame<SONARS>, turn: Option<Turn>) -> Option<Step> {
-        let (place, update) = either!(&mut self.stages, mapper => mapper.observe(frame, turn))?;
-        if let Stages::Paper(mapper, ancestry) = &mut self.stages {
-            let particles = mapper.filter().particles().iter();
-            ancestry.advance(particles.map(|particle| (particle.parent.into(), particle.at.into())));
-        }
+        let (place, update) = self.stages.observe(frame, turn)?;
         let map = self.map();
         let step = Step { place, update, vertices: map.vertices().len() as u8, edges: map.edges().count() };
         self.steps.push(step);
@@ -99,37 +153,18 @@ impl<const SONARS: usize> Mapping<SONARS> {
 
     /// The best map.
     pub fn map(&self) -> &Map<VERTICES> {
-        either!(&self.stages, mapper => mapper.map())
+        self.stages.map()
     }
 
     /// What went wrong: in the detector and in the filter.
     pub fn faults(&self) -> FaultCounters {
-        either!(&self.stages, mapper => mapper.faults())
-    }
-
-    /// Where the robot may be after the last place, and how far the map is to be trusted.
-    pub fn belief(&self) -> Option<Belief> {
-        let place_index = self.steps.last()?.update.place_index;
-        Some(either!(&self.stages, mapper => Belief::of(mapper.filter(), place_index)))
-    }
-
-    /// What the map explains worst after the last place.
-    pub fn worst(&self) -> Option<Worst> {
-        let place_index = self.steps.last()?.update.place_index;
-        Some(either!(&self.stages, mapper => Worst::of(mapper.filter(), place_index)))
+        self.stages.faults()
     }
 
     /// The vertex of the best map that each place so far was taken for, by the best hypothesis of now; `None` for a place
     /// that is older than the filter's history.
     pub fn path(&self) -> Vec<Option<usize>> {
-        let known: Vec<usize> = match &self.stages {
-            Stages::Robust(mapper) => mapper.filter().path().map(usize::from).collect(),
-            Stages::Paper(mapper, ancestry) => {
-                let filter = mapper.filter();
-                let best = filter.particles().iter().position(|particle| std::ptr::eq(particle, filter.best()));
-                best.map_or(Vec::new(), |best| ancestry.path(best).to_vec())
-            }
-        };
+        let known = self.stages.path();
         let forgotten = self.steps.len().saturating_sub(known.len());
         std::iter::repeat_n(None, forgotten).chain(known.into_iter().map(Some)).collect()
     }

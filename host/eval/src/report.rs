@@ -31,11 +31,11 @@ pub struct SettingsReport {
     pub prior: String,
     /// What the filter was told besides fingerprints, as on the command line.
     pub hints: String,
-    /// How many slices of the time between two places the filter used.
-    pub polish: u32,
-    /// How many slices the filter used after each place of the prior.
-    pub polish_prior: u32,
-    /// How many slices a search from the truth took; 0 without one.
+    /// Refinement steps of the filter after each place.
+    pub refinement_steps: u32,
+    /// Refinement steps of the filter after each place of the prior.
+    pub prior_refinement_steps: u32,
+    /// Refinement steps of a search from the true path; 0 without one.
     pub search_from_truth: u32,
     /// How many bits a fingerprint has.
     pub fingerprint_bits: u32,
@@ -84,8 +84,8 @@ impl SettingsReport {
             seed: settings.seed,
             prior: settings.prior.name().into(),
             hints: settings.hints.to_string(),
-            polish: settings.polish,
-            polish_prior: settings.polish_prior,
+            refinement_steps: settings.refinement_steps,
+            prior_refinement_steps: settings.prior_refinement_steps,
             search_from_truth: settings.search_from_truth,
             fingerprint_bits: settings.fingerprint_bits,
             ngram_length: settings.ngram_length.get(),
@@ -271,10 +271,11 @@ fn row(case: &Case, settings: &Settings, results: &[PathResult], check_point: us
 
 impl fmt::Display for Report {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let SettingsReport { seed, prior, hints, fingerprint_bits, ngram_length, filters, polish, .. } = &self.settings;
+        let SettingsReport { seed, prior, hints, fingerprint_bits, ngram_length, filters, refinement_steps, .. } =
+            &self.settings;
         write!(
             f,
-            "seed {seed}, prior {prior}, hints {hints}, {fingerprint_bits} bits, n = {ngram_length}, {polish} slices"
+            "seed {seed}, prior {prior}, hints {hints}, {fingerprint_bits} bits, n = {ngram_length}, {refinement_steps} refinement steps"
         )?;
         for (name, filter) in filters {
             // The parameters by the names they have in JSON.

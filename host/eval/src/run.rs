@@ -5,16 +5,13 @@ use super::{
     case::Case,
     environment::Environment,
     judge::judge,
+    parallel,
     prior::PriorSource,
     report::{Row, rows},
     settings::{EvaluationError, Settings},
     trial::Trial,
     walk::all_walks,
 };
-use rayon::prelude::*;
-
-/// Filters and priors are made on the stack, in builds without optimisation more than once.
-const STACK_BYTES: usize = 64 << 20;
 
 /// The environments of a case, each with the walks whose n-grams an exploration brings.
 pub struct Course<'a> {
@@ -64,11 +61,11 @@ pub fn evaluate(
     let course = Course::new(case, settings)?;
     let most_explored = course.explored.iter().map(Vec::len).max().unwrap_or(0);
     let start = choose(settings, most_explored)?;
-    let threads = rayon::ThreadPoolBuilder::new().num_threads(settings.threads).stack_size(STACK_BYTES).build();
-    let threads = threads.map_err(|_| EvaluationError::Threads)?;
-    let results: Vec<_> = threads.install(|| {
-        let paths = (0..settings.paths as u64).into_par_iter();
-        paths.map(|path| judge(&course.trial(path), settings, start)).inspect(|_| path_done()).collect()
-    });
+    let one = |path| {
+        let result = judge(&course.trial(path as u64), settings, start);
+        path_done();
+        result
+    };
+    let results = parallel::map(settings.paths, settings.threads, one).map_err(|_| EvaluationError::Threads)?;
     Ok(rows(case, settings, &results))
 }

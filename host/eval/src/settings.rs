@@ -18,11 +18,11 @@ pub struct Settings {
     pub filter: Filter,
     /// What the filter knows before it starts.
     pub prior: PriorSource,
-    /// How many slices of the time between two places the filter uses.
-    pub polish: u32,
-    /// How many slices the filter uses after each place of the n-grams of a prior.
-    pub polish_prior: u32,
-    /// How many slices a search from the truth takes at each check point; 0 for no search.
+    /// Refinement steps of the filter after each place.
+    pub refinement_steps: u32,
+    /// Refinement steps of the filter after each place of the prior n-grams.
+    pub prior_refinement_steps: u32,
+    /// Refinement steps of a search from the true path at each check point; 0 for no search.
     pub search_from_truth: u32,
     /// What the filter is told besides fingerprints.
     pub hints: Hints,

@@ -21,12 +21,12 @@ const BUFFER_BYTES: usize = 4096;
 ///
 /// ```no_run
 /// use toposlam::wire::Command;
-/// use toposlam_link::{client::Client, line, wording};
+/// use toposlam_link::{client::Client, line, event_text};
 ///
 /// let robot = line::open("tcp:127.0.0.1:7070", 115_200)?;
 /// let mut client = Client::new(robot, 1, |_, _| ());
 /// println!("{} vertices", client.map()?.vertices());
-/// println!("{}", wording::outcome(&client.request(Command::GoTo { vertex: 0 })?));
+/// println!("{}", event_text::outcome(&client.request(Command::GoTo { vertex: 0 })?));
 /// std::fs::write("office.map", client.snapshot()?)?;
 /// # Ok::<(), anyhow::Error>(())
 /// ```
@@ -245,11 +245,11 @@ impl fmt::Display for ClientError {
         match self {
             Self::Line(_) => f.write_str("the line to the robot failed"),
             Self::NoReply { attempts } => {
-                write!(f, "the robot did not answer {attempts} requests: it is not there, or does not know the command")
+                write!(f, "no reply to {attempts} requests: the robot is not connected, or does not know the command")
             }
             Self::Refused(refusal) => write!(f, "the robot refused: {refusal}"),
-            Self::OutOfPlace(outcome) => write!(f, "the robot answered something else: {outcome:?}"),
-            Self::NoMap => f.write_str("the map did not arrive whole"),
+            Self::OutOfPlace(outcome) => write!(f, "unexpected reply: {outcome:?}"),
+            Self::NoMap => f.write_str("the received map is incomplete"),
         }
     }
 }

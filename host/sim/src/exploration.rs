@@ -11,7 +11,7 @@
 //! while exploration.places() < 3 {
 //!     exploration.advance();
 //! }
-//! assert!(exploration.robot().mapper().map().vertices() >= 2);
+//! assert!(exploration.robot().mapper().map().vertices().len() >= 2);
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
@@ -27,7 +27,7 @@ use toposlam::{FaultCounters, FaultKind};
 
 use crate::Step;
 use crate::injector::{FaultRates, LineInjector, RingInjector};
-use crate::world::{BodyModel, Journal, Plan, RobotModel, Rover, VoronoiError};
+use crate::world::{BodyModel, GroundTruth, Plan, RobotModel, Rover, VoronoiError};
 
 /// How long a ring frame lasts on the simulated board, in milliseconds.
 const FRAME_MS: u32 = 100;
@@ -91,7 +91,7 @@ pub struct Exploration<'buffer> {
     ring_faults: FaultCounters,
     /// What changes the frames and the received bytes, when faults are wanted.
     injectors: Option<(RingInjector, LineInjector)>,
-    journal: Journal,
+    ground_truth: GroundTruth,
     nodes: Vec<Option<usize>>,
     steps: Vec<Step>,
     frames: u64,
@@ -111,7 +111,7 @@ impl<'buffer> Exploration<'buffer> {
         let rover = Rover::new(plan, model, BodyModel::default(), seed)?;
         let mut robot = Box::new(ReferenceRobot::new());
         robot.start(&ROBOT, buffer).expect("the reference robot's settings are sound");
-        let journal = Journal::new(rover.true_map());
+        let ground_truth = GroundTruth::new(rover.true_map());
         Ok(Self {
             rover,
             robot,
@@ -120,7 +120,7 @@ impl<'buffer> Exploration<'buffer> {
             requests: 0,
             ring_faults: FaultCounters::new(),
             injectors: None,
-            journal,
+            ground_truth,
             nodes: Vec::new(),
             steps: Vec::new(),
             frames: 0,
@@ -136,7 +136,7 @@ impl<'buffer> Exploration<'buffer> {
     /// The world's next frame. [`Exploration::map`] is to follow.
     pub fn frame(&mut self) -> RingFrame<SONARS> {
         let (frame, truth) = self.rover.frame();
-        self.journal.drive(&truth);
+        self.ground_truth.drive(&truth);
         frame
     }
 
@@ -158,7 +158,7 @@ impl<'buffer> Exploration<'buffer> {
 
     /// Notes a place that another robot in this world has found, in the world's frame with that number.
     pub fn note(&mut self, place: &Place) {
-        self.nodes.push(self.journal.detect(place).node);
+        self.nodes.push(self.ground_truth.detect(place).node);
     }
 
     /// Drives on as far as until the next frame.
@@ -224,8 +224,8 @@ impl<'buffer> Exploration<'buffer> {
     }
 
     /// The log of its drive.
-    pub const fn journal(&self) -> &Journal {
-        &self.journal
+    pub const fn ground_truth(&self) -> &GroundTruth {
+        &self.ground_truth
     }
 
     /// How many places it has found.

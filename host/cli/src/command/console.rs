@@ -8,20 +8,20 @@ use toposlam::wire::{Command, MapReplica};
 use toposlam_link::client::Client;
 use toposlam_link::line::{Line, open};
 use toposlam_link::listener::{Event, Listener};
-use toposlam_link::{setting, wording};
+use toposlam_link::{event_text, setting};
 
 /// Arguments of `toposlam command`.
 #[derive(Args)]
 pub(crate) struct Arguments {
-    /// The robot's line: a serial port, or tcp:HOST:PORT.
+    /// Serial port of the robot, or tcp:HOST:PORT.
     line: String,
-    /// The speed of a serial port.
+    /// Baud rate of a serial port.
     #[arg(long, default_value_t = 115_200)]
     baud: u32,
-    /// Repeat a request after this many milliseconds without a reply.
+    /// Timeout of a reply, in milliseconds; then the request is repeated.
     #[arg(long, default_value_t = 1000)]
     timeout_ms: u64,
-    /// Send a request this often before giving up.
+    /// Number of times that a request is sent before the command fails.
     #[arg(long, default_value_t = 5)]
     attempts: u32,
     #[command(subcommand)]
@@ -30,45 +30,45 @@ pub(crate) struct Arguments {
 
 #[derive(Subcommand)]
 enum Action {
-    /// Say which robot this is and what it does.
+    /// Print version, settings and state of the robot.
     Info,
     /// Print the map.
     Map,
-    /// Take a snapshot and write it to a file.
+    /// Fetch a snapshot of the map and write it to a file.
     Snapshot {
-        /// The file.
+        /// File to write.
         file: PathBuf,
     },
-    /// Go on with the map of a snapshot.
+    /// Replace the map by that of a snapshot.
     Restore {
-        /// A file that `snapshot` wrote.
+        /// File written by `snapshot`.
         file: PathBuf,
     },
-    /// Forget the map and start anew.
+    /// Delete the map and restart mapping.
     Reset,
     /// Change a setting.
     Set {
-        /// Which one.
+        /// Name of the setting.
         #[arg(value_parser = setting::NAMES)]
         name: String,
-        /// Its value.
+        /// New value; docs/wire.md lists units and ranges.
         value: u16,
     },
-    /// Keep the map as it is and only tell where the robot is, or go on mapping.
+    /// Keep the map unchanged and only localise, or map again.
     LocaliseOnly {
-        /// Whether the map is kept.
+        /// on: localise only; off: map.
         state: Switch,
     },
     /// Drive to a vertex of the map.
     GoTo {
-        /// The number of the vertex.
+        /// Number of the vertex.
         vertex: u8,
     },
-    /// Go on exploring.
+    /// Explore the building.
     Explore,
-    /// Stand still, or go on.
+    /// Pause the robot and the mapping, or continue.
     Pause {
-        /// Whether to stand still.
+        /// on: pause; off: continue.
         state: Switch,
     },
 }
@@ -85,7 +85,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     client.timeout = std::time::Duration::from_millis(arguments.timeout_ms);
     client.attempts = arguments.attempts;
     match &arguments.action {
-        Action::Info => println!("{}", wording::info(&client.info()?).join("\n")),
+        Action::Info => println!("{}", event_text::info(&client.info()?).join("\n")),
         Action::Map => print_map(client.map()?),
         Action::Snapshot { file } => {
             let snapshot = client.snapshot()?;
@@ -99,7 +99,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
         }
         Action::Reset => order(&mut client, Command::Reset)?,
         Action::Set { name, value } => {
-            let setting = setting::named(name, *value).context("there is no such setting")?;
+            let setting = setting::named(name, *value).context("unknown setting")?;
             order(&mut client, Command::SetConfig(setting))?;
         }
         Action::LocaliseOnly { state } => {

@@ -1,44 +1,48 @@
 //! What `simulate` and `emulate` have in common: where the robot drives, and the summary of how that went.
 
+use std::ops::RangeInclusive;
 use std::path::PathBuf;
 
 use anyhow::Context;
 use clap::Args;
-use indicatif::{ProgressBar, ProgressStyle};
 use toposlam::reference::VERTICES;
 use toposlam::wire::map_digest;
 use toposlam::{FaultCounters, Map};
 use toposlam_cli::picture::{Drawing, draw};
+use toposlam_eval::faults::fault_lines;
 use toposlam_eval::mapping::score_path;
-use toposlam_eval::recording::fault_lines;
 use toposlam_sim::exploration::Exploration;
-use toposlam_sim::world::{Journal, Plan, RobotModel, TrueMap};
+use toposlam_sim::world::{GroundTruth, Plan, RobotModel, TrueMap};
 
-/// Where the robot drives, and how well its sonars hear.
+/// The floor plan, the seed and the noise.
 #[derive(Args)]
 pub(super) struct DriveArguments {
-    /// Floor plan: ring, office, flat, or a file.
+    /// Floor plan: ring, office, flat, or a text file (docs/driving.md).
     #[arg(long, default_value = "office")]
     plan: String,
-    /// Seed of the drive and of every noise.
+    /// Seed of the drive and of all noise.
     #[arg(long, default_value_t = 1)]
     seed: u64,
-    /// Every noise of the robot, multiplied by this.
+    /// Factor on every noise of the robot, 0 to 100.
     #[arg(long, default_value_t = 1.0, value_parser = noise_factor)]
     noise: f64,
-    /// Write a picture of the map over the floor plan here.
-    #[arg(long)]
+    /// Write the map over the floor plan to an SVG file.
+    #[arg(long, value_name = "FILE")]
     svg: Option<PathBuf>,
 }
 
+/// A number within a range, both ends included.
+pub(super) fn number_in(text: &str, range: RangeInclusive<f64>) -> Result<f64, String> {
+    let allowed = format!("expected a number from {} to {}", range.start(), range.end());
+    text.parse().ok().filter(|number| range.contains(number)).ok_or(allowed)
+}
+
 pub(super) fn noise_factor(text: &str) -> Result<f64, String> {
-    let factor = text.parse().map_err(|error| format!("{error}"))?;
-    if (0.0..=100.0).contains(&factor) { Ok(factor) } else { Err("must be 0 to 100".to_owned()) }
+    number_in(text, 0.0..=100.0)
 }
 
 pub(super) fn fault_rate(text: &str) -> Result<f64, String> {
-    let rate = text.parse().map_err(|error| format!("{error}"))?;
-    if (0.0..=1.0).contains(&rate) { Ok(rate) } else { Err("must be 0 to 1".to_owned()) }
+    number_in(text, 0.0..=1.0)
 }
 
 impl DriveArguments {
@@ -57,12 +61,12 @@ impl DriveArguments {
         self.seed
     }
 
-    /// Prints how the drive went and how right the map is, and draws the picture if one is wanted.
+    /// Prints the detected places and the scores of the map, and writes the picture if `--svg` was given.
     pub(super) fn summarise<const V: usize>(&self, drive: &Summary<'_, V>) -> anyhow::Result<()> {
-        let Summary { plan, truth, journal, map, path, faults } = drive;
-        let detections = journal.detections();
-        println!("\n{}: {} places in {} visits", self.plan, detections.len(), journal.visits());
-        println!("{}", journal.report());
+        let Summary { plan, truth, ground_truth, map, path, faults } = drive;
+        let detections = ground_truth.detections();
+        println!("\n{}: {} places in {} visits", self.plan, detections.len(), ground_truth.visits());
+        println!("{}", ground_truth.report());
         let nodes: Vec<Option<usize>> = detections.iter().map(|detection| detection.node).collect();
         let score = score_path(map, path, truth, &nodes);
         let (vertices, edges) = (map.vertices().len(), map.edges().count());
@@ -84,34 +88,28 @@ impl DriveArguments {
     }
 }
 
-/// What a drive came to.
+/// The result of a drive.
 pub(super) struct Summary<'a, const V: usize> {
     pub(super) plan: &'a Plan,
     pub(super) truth: &'a TrueMap,
-    pub(super) journal: &'a Journal,
+    pub(super) ground_truth: &'a GroundTruth,
     pub(super) map: &'a Map<V>,
     pub(super) path: Vec<Option<usize>>,
     pub(super) faults: FaultCounters,
 }
 
 impl<'a> Summary<'a, VERTICES> {
-    /// That of a robot which drove by itself.
+    /// The summary of an exploration.
     pub(super) fn of(plan: &'a Plan, exploration: &'a Exploration<'_>) -> Self {
         Self {
             plan,
             truth: exploration.rover().true_map(),
-            journal: exploration.journal(),
+            ground_truth: exploration.ground_truth(),
             map: exploration.robot().mapper().map(),
             path: exploration.path(),
             faults: exploration.faults(),
         }
     }
-}
-
-/// A bar that counts places.
-pub(super) fn progress_bar(places: usize) -> anyhow::Result<ProgressBar> {
-    let style = ProgressStyle::with_template("{bar:40} {pos}/{len} places, {elapsed}")?;
-    Ok(ProgressBar::new(places as u64).with_style(style))
 }
 
 fn yes_or_no(answer: bool) -> &'static str {
@@ -123,7 +121,8 @@ pub(super) fn load_plan(name_or_file: &str) -> anyhow::Result<Plan> {
     if let Some(plan) = Plan::built_in(name_or_file) {
         return Ok(plan);
     }
-    let text = std::fs::read_to_string(name_or_file)
-        .with_context(|| format!("{name_or_file:?} is neither a built-in plan (ring, office, flat) nor a file"))?;
+    let text = std::fs::read_to_string(name_or_file).with_context(|| {
+        format!("{name_or_file:?} is neither a built-in floor plan (ring, office, flat) nor a readable file")
+    })?;
     Plan::parse(&text).with_context(|| format!("floor plan {name_or_file}"))
 }

@@ -14,10 +14,11 @@ use toposlam::drive::VelocityCommand;
 use toposlam::reference::SNAPSHOT_BYTES;
 use toposlam::wire::{Belief, Evidence, Location, Message, Worst};
 use toposlam_cli::emulator::Emulation;
+use toposlam_cli::progress::Progress;
 use toposlam_sim::exploration::Exploration;
 use toposlam_sim::injector::FaultRates;
 
-use super::drive::{DriveArguments, Summary, fault_rate, progress_bar};
+use super::drive::{DriveArguments, Summary, fault_rate};
 use super::hardship;
 use super::heard::Heard;
 
@@ -29,25 +30,25 @@ const IMAGE: &str = "thumbv7em-none-eabihf/firmware/robot";
 pub(crate) struct Arguments {
     #[command(flatten)]
     drive: DriveArguments,
-    /// Drive until this many places were detected.
+    /// Stop after this many detected places.
     #[arg(long, default_value_t = 30)]
     places: usize,
-    /// The firmware image; built with `cargo firmware` when it is not given.
-    #[arg(long)]
+    /// Firmware image [default: built with `cargo firmware`].
+    #[arg(long, value_name = "FILE")]
     elf: Option<PathBuf>,
-    /// The emulator.
-    #[arg(long, default_value = "qemu-system-arm")]
+    /// Emulator to run.
+    #[arg(long, value_name = "PROGRAM", default_value = "qemu-system-arm")]
     qemu: PathBuf,
-    /// Give up after this many seconds.
-    #[arg(long, default_value_t = 800)]
+    /// Timeout of the whole run, in seconds.
+    #[arg(long, value_name = "SECONDS", default_value_t = 800)]
     timeout_s: u64,
-    /// Faults of the sensor bus and the line, 0 to 1: the probability that a transfer is refused; the others follow
-    /// (docs/faults.md). With faults the map is held to the truth, and not to this computer's.
-    #[arg(long, default_value_t = 0.0, value_parser = fault_rate)]
+    /// Fault rate of the sensor bus and the line, 0 to 1: the probability that a bus transfer fails. Every other rate is proportional to
+    /// it (docs/faults.md). With faults, the map is compared with the ground truth and not with that of `simulate`.
+    #[arg(long, value_name = "RATE", default_value_t = 0.0, value_parser = fault_rate)]
     faults: f64,
 }
 
-/// So long the world waits for the firmware to say where it drives.
+/// How long the world waits for the velocity command of the firmware.
 const VELOCITY_TIMEOUT: Duration = Duration::from_secs(10);
 
 /// The same robot on this computer, and where it wanted to go after each frame.
@@ -75,7 +76,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
         velocities: Vec::new(),
     });
     let (tell_velocity, velocities) = mpsc::channel::<VelocityCommand>();
-    let progress = progress_bar(arguments.places)?;
+    let progress = Progress::new("", arguments.places, "places");
     let mut heard = Heard::new();
     let mut elsewhere = None;
     let mut frames = 0;
@@ -97,8 +98,8 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
             if repetition.exploration.map(&frame).is_some()
                 && let Some(step) = repetition.exploration.steps().last()
             {
-                bar.suspend(|| println!("{step}"));
-                bar.inc(1);
+                bar.println(step);
+                bar.increment();
             }
             let velocity = repetition.exploration.board().velocity;
             repetition.velocities.push(velocity);
@@ -130,17 +131,15 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
             })
         },
     )?;
-    progress.finish_and_clear();
+    drop(progress);
     if let Some(message) = elsewhere {
-        bail!("the firmware says {message:?}, and this computer does not");
+        bail!("the firmware sent {message:?}, which differs from the simulation");
     }
 
-    let Ok(Repetition { exploration, .. }) = repetition.into_inner() else {
-        bail!("the repetition on this computer failed")
-    };
+    let Ok(Repetition { exploration, .. }) = repetition.into_inner() else { bail!("the simulation failed") };
     arguments.drive.summarise(&Summary::of(&plan, &exploration))?;
     let counters = heard.decoder.counters();
-    let Some(health) = heard.replica.health() else { bail!("the firmware never said how it is doing") };
+    let Some(health) = heard.replica.health() else { bail!("the firmware sent no Health message") };
     println!("firmware: {} places in {} frames, {:.1} s", heard.places.len(), outcome.frames, outcome.seconds);
     println!("wire: {} messages, {} frames lost, {} corrupt", counters.messages, counters.lost, counters.corrupt);
     println!("sensor bus: {} bytes, {} rounds of the loop", outcome.bus_bytes, health.loop_count);
@@ -148,17 +147,17 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
         println!("stack_high_water_bytes: {bytes}");
     }
     compare(&exploration, &heard)?;
-    println!("the firmware's drive and map are this computer's, bit for bit");
+    println!("drive and map of the firmware and of the simulation are equal bit for bit");
     Ok(())
 }
 
-/// Holds what the firmware said to this computer's repetition. The digest is part of a converged picture.
+/// Compares the messages of the firmware with the simulation.
 fn compare(exploration: &Exploration<'_>, heard: &Heard) -> anyhow::Result<()> {
     let (steps, mapper) = (exploration.steps(), exploration.robot().mapper());
     let map = mapper.map();
     let places = steps.iter().map(|step| (step.update.place_index, step.place.fingerprint.radius_mm()));
-    ensure!(places.eq(heard.places.iter().copied()), "the firmware detected other places than this computer");
-    ensure!(heard.replica.is_converged(), "the map heard over the wire is not complete");
+    ensure!(places.eq(heard.places.iter().copied()), "the firmware detected other places than the simulation");
+    ensure!(heard.replica.is_converged(), "the map received over the wire is incomplete");
     let same_rows = map.vertices().all(|vertex| {
         heard.replica.row(vertex.into()).is_some_and(|row| {
             map.label(vertex).map(|label| label.radius_mm()) == Some(row.radius_mm)
@@ -167,18 +166,15 @@ fn compare(exploration: &Exploration<'_>, heard: &Heard) -> anyhow::Result<()> {
         })
     });
     let same_size = usize::from(heard.replica.vertices()) == map.vertices().len();
-    ensure!(same_rows && same_size, "the firmware's map is another one");
+    ensure!(same_rows && same_size, "the map of the firmware differs");
     if let Some(step) = steps.last() {
         let (filter, place_index) = (mapper.filter(), step.update.place_index);
-        ensure!(
-            heard.replica.location() == Some(Location::from(&step.update)),
-            "the firmware believes to be elsewhere"
-        );
-        ensure!(heard.replica.evidence() == Some(Evidence::from(&step.update)), "the firmware gives other evidence");
+        ensure!(heard.replica.location() == Some(Location::from(&step.update)), "the firmware reports another vertex");
+        ensure!(heard.replica.evidence() == Some(Evidence::from(&step.update)), "the firmware reports other evidence");
         let belief = Some(Belief::of(filter, place_index));
-        ensure!(heard.replica.belief() == belief, "the firmware gives other probabilities");
+        ensure!(heard.replica.belief() == belief, "the firmware reports other probabilities");
         let worst = Some(Worst::of(filter, place_index));
-        ensure!(heard.replica.worst() == worst, "the firmware names another worst n-gram");
+        ensure!(heard.replica.worst() == worst, "the firmware reports another worst n-gram");
     }
     Ok(())
 }

@@ -3,13 +3,13 @@
 use super::filter::FilterArgument;
 use anyhow::{Context, ensure};
 use clap::{Args, ValueEnum};
-use indicatif::{ProgressBar, ProgressStyle};
 use std::{
     fs,
     num::NonZeroUsize,
     path::{Path, PathBuf},
 };
 use toposlam::{Config, Direction, NgramLength, RobustConfig};
+use toposlam_cli::progress::Progress;
 use toposlam_eval::{
     case::{Case, Placements},
     environment::Environment,
@@ -32,96 +32,98 @@ pub(crate) struct Arguments {
     course: CourseArguments,
     #[command(flatten)]
     filter: FilterArguments,
-    /// Write what the filter sees on each path, and the truth, as files below this directory.
+    /// Write the observations and the ground truth of each path to files in this directory.
     #[arg(long, value_name = "DIR")]
     export: Option<PathBuf>,
-    /// Run both filters on the same paths, and draw the paper's Fig. 4 and 5 for both here: fig4.svg and fig5.svg.
+    /// Run both filters on the same paths, and write the paper's Fig. 4 and 5 as fig4.svg and fig5.svg to this directory.
     #[arg(long, value_name = "DIR", conflicts_with = "filter")]
     plot: Option<PathBuf>,
-    /// What to print on the standard output.
+    /// Output format.
     #[arg(long, default_value = "json")]
     format: Format,
 }
 
-/// Where the paths lead.
+/// The environments.
 #[derive(Args)]
 #[group(required = true, multiple = true)]
 struct CaseArguments {
-    /// Environment files.
+    /// Environment files (docs/evaluation.md).
     #[arg(long = "environment", value_name = "FILE.toml", num_args = 1..)]
     environments: Vec<PathBuf>,
-    /// The environment of a file with COUNT other random placements of its labels.
+    /// Environment of a file with its labels placed at random, COUNT times.
     #[arg(long, value_name = "SEED,COUNT,FILE.toml")]
     placements: Vec<Placements>,
     /// COUNT random environments of V_MIN to V_MAX places. DEGREE (mean number of neighbours), LABELS (number of
     /// categories) and NOISE (standard deviation of fingerprints, in metres) are numbers or ranges A-B. CLASS is
-    /// general or right-resolving.
+    /// general [default] or right-resolving.
     #[arg(long = "family", value_name = "SEED,COUNT,V_MIN,V_MAX,DEGREE,LABELS,NOISE[,CLASS]")]
     families: Vec<Family>,
 }
 
-/// What happens on the paths.
+/// The paths and what the filter gets on them.
 #[derive(Args)]
 struct CourseArguments {
-    /// How many paths to draw in each environment, or evenly over all environments of a family.
+    /// Paths per environment, or per family, over whose environments they are distributed evenly.
     #[arg(long, value_name = "P", default_value = "500")]
     paths: NonZeroUsize,
-    /// After how many places of a path its map is judged. If the last number is 100 or more, paths that miss an edge are
+    /// Places after which the map is scored, in ascending order. If the last number is 100 or more, a path that misses an edge is
     /// drawn again.
     #[arg(long, alias = "length", value_name = "T,...", default_value = "100", value_delimiter = ',')]
     lengths: Vec<NonZeroUsize>,
-    /// The seed of paths, noise, hints and filter.
+    /// Seed of paths, noise, hints and filter.
     #[arg(long, value_name = "S", default_value_t = 1)]
     seed: u64,
-    /// Where the n-grams of the environment come from.
+    /// Source of the prior n-grams of the environment.
     #[arg(long, default_value = "none")]
     prior: PriorChoice,
-    /// What the filter is told besides fingerprints: none, turn, degree or both; missing and wrong are probabilities.
+    /// Hints besides fingerprints: none, turn, degree or both. The probabilities of a missing and of a wrong hint are 0 to 1
+    /// [default: 0].
     #[arg(long, value_name = "HINTS[,missing=P,wrong=P]", default_value = "none")]
     hints: Hints,
-    /// How many slices of the time between two places the robust filter uses; on a robot there is one for each ring frame.
-    #[arg(long, value_name = "SLICES", default_value_t = 10)]
-    polish: u32,
-    /// How many slices the robust filter uses after each place of the n-grams of a prior.
-    #[arg(long, value_name = "SLICES", default_value_t = 10)]
-    polish_prior: u32,
-    /// At each check point, also search for so many slices from the true path, and report how often the search leaves it
-    /// for a better map: what no search could do better with this score. 0: no search.
-    #[arg(long, value_name = "SLICES", default_value_t = 0)]
+    /// Robust: refinement steps after each place; a robot does one per ring frame.
+    #[arg(long, alias = "polish", value_name = "STEPS", default_value_t = 10)]
+    refinement_steps: u32,
+    /// Robust: refinement steps after each place of the prior n-grams.
+    #[arg(long, alias = "polish-prior", value_name = "STEPS", default_value_t = 10)]
+    prior_refinement_steps: u32,
+    /// Robust: refinement steps of a search that starts at the true path, after each length of --lengths. Reports how often it prefers
+    /// another map, which is a bound for every search with this score. 0 for no search.
+    #[arg(long, value_name = "STEPS", default_value_t = 0)]
     from_truth: u32,
-    /// How many bits a fingerprint has, 1 to 12.
+    /// Bits per fingerprint, 1 to 12.
     #[arg(long, value_name = "B", default_value_t = 12, value_parser = clap::value_parser!(u32).range(1..=12))]
     fingerprint_bits: u32,
-    /// n, how many labels an n-gram has, from 2 to 7.
+    /// Labels per n-gram, 2 to 7.
     #[arg(long, value_name = "n", default_value_t = Config::DEFAULT.ngram_length)]
     ngram_length: u8,
-    /// How many threads; as many as there are processors when 0.
+    /// Threads; 0 for one per processor.
     #[arg(long, value_name = "THREADS", default_value_t = 0)]
     threads: usize,
 }
 
-/// The filter and its parameters. Those of another filter are refused.
+/// The filter and its parameters. Parameters of the other filter are refused.
 #[derive(Args)]
 struct FilterArguments {
-    /// The filter to evaluate.
+    /// Filter to evaluate.
     #[arg(long, default_value = "robust")]
     filter: FilterArgument,
-    /// How many hypotheses (robust) or particles (paper) the filter keeps, 1 to 100 [default: 10].
+    /// Hypotheses (robust) or particles (paper), 1 to 100 [default: 10].
     #[arg(long, alias = "particles", value_name = "N")]
     hypotheses: Option<u8>,
-    /// Robust: a first guess at the standard deviation of a fingerprint, in millimetres.
+    /// Robust: initial estimate of the standard deviation of a fingerprint, in millimetres
+    /// [default: 30].
     #[arg(long, value_name = "MM")]
     noise_mm: Option<u16>,
-    /// Robust: how many repair moves are tried at each place.
+    /// Robust: repair moves tried at each place [default: 1].
     #[arg(long, value_name = "R")]
     moves: Option<u8>,
-    /// Robust: how often the filter takes a turn for wrong, in whole thousandths.
+    /// Robust: assumed probability of a wrong turn hint, 0 to 1 in steps of 0.001 [default: 0.02].
     #[arg(long, value_name = "P", value_parser = permille)]
     wrong_turn: Option<u16>,
-    /// Robust: how often the filter takes a degree for wrong, in whole thousandths.
+    /// Robust: assumed probability of a wrong degree hint, 0 to 1 in steps of 0.001 [default: 0.1].
     #[arg(long, value_name = "P", value_parser = permille)]
     wrong_degree: Option<u16>,
-    /// Paper: which half of Eq. 2 the filter takes [default: two-sided].
+    /// Paper: consistency measure, both halves of Eq. 2 or one [default: two-sided].
     #[arg(long)]
     consistency: Option<ConsistencyChoice>,
     /// Paper: sigma_l of Eq. 7 and 9, in millimetres [default: 50].
@@ -130,18 +132,18 @@ struct FilterArguments {
     /// Paper: sigma_c of Eq. 8, in millimetres [default: 30].
     #[arg(long, value_name = "MM")]
     sigma_consistency_mm: Option<u16>,
-    /// Paper: phi of Eq. 9, in whole thousandths [default: 0.1].
+    /// Paper: phi of Eq. 9, 0 to 1 in steps of 0.001 [default: 0.1].
     #[arg(long, value_name = "PHI", value_parser = permille)]
     penalty: Option<u16>,
 }
 
 #[derive(Clone, Copy, ValueEnum)]
 enum PriorChoice {
-    /// All of the path itself, known before it starts.
+    /// All n-grams of the path itself.
     Path,
     /// One noisy n-gram for every walk of n places, from an earlier exploration of the whole environment.
     Exploration,
-    /// Only what the path has brought so far.
+    /// No prior: only the n-grams of the path so far.
     None,
 }
 
@@ -149,9 +151,9 @@ enum PriorChoice {
 enum ConsistencyChoice {
     /// Eq. 2 as printed.
     TwoSided,
-    /// Every walk of the map must be near something observed.
+    /// Every walk of the map is near an observed n-gram.
     MapToHistory,
-    /// Everything observed must be near a walk of the map.
+    /// Every observed n-gram is near a walk of the map.
     HistoryToMap,
 }
 
@@ -159,7 +161,7 @@ enum ConsistencyChoice {
 enum Format {
     /// One JSON object.
     Json,
-    /// A table to read.
+    /// A table.
     Table,
 }
 
@@ -204,10 +206,9 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
 /// Evaluates one filter in one case, with a bar on the standard error, and says there what a reader should know.
 fn evaluate_with_progress(case: &Case, settings: &Settings) -> anyhow::Result<Vec<Row>> {
     let title = format!("{}, {} filter", case.name, settings.filter.name());
-    let bar = ProgressBar::new(settings.paths as u64).with_message(title.clone());
-    bar.set_style(ProgressStyle::with_template("{msg} {wide_bar} {pos}/{len} paths {eta}")?);
-    let rows = evaluate(case, settings, || bar.inc(1)).with_context(|| title.clone())?;
-    bar.finish_and_clear();
+    let bar = Progress::new(title.clone(), settings.paths, "paths");
+    let rows = evaluate(case, settings, || bar.increment()).with_context(|| title.clone())?;
+    drop(bar);
     if let Some(row) = rows.first() {
         if row.paths_not_exhaustive > 0 {
             eprintln!("{title}: {} of {} paths do not traverse every edge", row.paths_not_exhaustive, row.paths);
@@ -273,8 +274,8 @@ impl CourseArguments {
                 PriorChoice::Exploration => PriorSource::Exploration,
                 PriorChoice::None => PriorSource::None,
             },
-            polish: self.polish,
-            polish_prior: self.polish_prior,
+            refinement_steps: self.refinement_steps,
+            prior_refinement_steps: self.prior_refinement_steps,
             search_from_truth: self.from_truth,
             hints: self.hints,
             fingerprint_bits: self.fingerprint_bits,

@@ -1,18 +1,18 @@
-//! `toposlam explore`: how often a robot that drives itself ends with the right map, over many runs, and how often it gets where
-//! it is told to go.
+//! `toposlam explore`: how often a robot that drives itself has the exact map after an exploration, and how often it then reaches its
+//! goals, over many runs.
 
 use anyhow::ensure;
 use clap::Args;
-use rayon::prelude::*;
 use toposlam::drive::GoalStatus;
 use toposlam::reference::SNAPSHOT_BYTES;
 use toposlam::wire::Command;
 use toposlam_eval::mapping::score_exploration;
+use toposlam_eval::parallel;
 use toposlam_sim::exploration::Exploration;
 use toposlam_sim::injector::FaultRates;
 use toposlam_sim::world::{Plan, Report, RobotModel};
 
-use super::drive::{fault_rate, load_plan, noise_factor};
+use super::drive::{fault_rate, load_plan, noise_factor, number_in};
 
 /// A goal_status that takes more ring frames is given up.
 const FRAMES_PER_JOURNEY: u64 = 20_000;
@@ -21,35 +21,36 @@ const FRAMES_PER_JOURNEY: u64 = 20_000;
 #[derive(Args)]
 pub(crate) struct Arguments {
     /// Floor plans: ring, office, flat, or files.
-    #[arg(long, value_delimiter = ',', default_value = "office,ring,flat")]
+    #[arg(long, value_name = "PLAN,...", value_delimiter = ',', default_value = "office,ring,flat")]
     plans: Vec<String>,
-    /// Every noise of the robot, multiplied by each of these.
-    #[arg(long, value_delimiter = ',', default_value = "1,2", value_parser = noise_factor)]
+    /// Factors on every noise of the robot, 0 to 100.
+    #[arg(long, value_name = "FACTOR,...", value_delimiter = ',', default_value = "1,2", value_parser = noise_factor)]
     noises: Vec<f64>,
-    /// Runs for each plan and noise; run i has seed i.
+    /// Runs for each plan and noise; run i has seed i, from 1.
     #[arg(long, default_value_t = 100)]
-    runs: u64,
-    /// Places of an exploration.
+    runs: usize,
+    /// Places per exploration.
     #[arg(long, default_value_t = 300)]
     places: usize,
-    /// After the exploration, so many vertices to go to, one after the other.
-    #[arg(long, default_value_t = 5)]
-    journeys: u64,
-    /// Sonars that are dead, as bits.
-    #[arg(long, default_value_t = 0)]
+    /// Goals after each exploration that ended with the exact map.
+    #[arg(long, alias = "journeys", default_value_t = 5)]
+    goals: u64,
+    /// Bit mask of dead sonars, 0 to 65535; bit 0 is the sonar straight ahead.
+    #[arg(long, value_name = "MASK", default_value_t = 0)]
     dead_sonars: u16,
-    /// Share of the echoes that are missed, instead of the noise's.
-    #[arg(long)]
+    /// Probability that an echo is missed, 0 to 1 [default: 0.02 times the noise factor].
+    #[arg(long, value_name = "P", value_parser = fault_rate)]
     missed: Option<f64>,
-    /// How far off its normal a wall is still heard, in degrees.
-    #[arg(long)]
+    /// Largest angle of incidence at which a wall returns an echo, in degrees, 0 to 90 [default: 25].
+    #[arg(long, value_name = "DEGREES", value_parser = degrees)]
     specular_limit_deg: Option<f64>,
-    /// Faults of the ring and the line, 0 to 1: the probability that a sonar's answer is lost; the others follow (docs/faults.md).
-    #[arg(long, default_value_t = 0.0, value_parser = fault_rate)]
+    /// Fault rate of the ring and the line, 0 to 1: the probability that a sonar echo is lost. Every other rate is proportional to it
+    /// (docs/faults.md).
+    #[arg(long, value_name = "RATE", default_value_t = 0.0, value_parser = fault_rate)]
     faults: f64,
 }
 
-/// What one run came to.
+/// The result of one run.
 struct Run {
     report: Report,
     exact: bool,
@@ -61,33 +62,38 @@ struct Run {
     journeys: Journeys,
 }
 
-/// How the journeys went.
+/// Goals after an exploration.
 #[derive(Clone, Copy, Default)]
 struct Journeys {
-    /// Those that were asked for on an exact map.
+    /// Goals that were commanded.
     asked: u64,
-    /// Those that ended at the true place.
+    /// Goals that were reached at the true place.
     arrived: u64,
-    /// Those that the robot took to have ended well and that had not.
+    /// Goals that the robot reported as reached at another place.
     elsewhere: u64,
 }
 
 pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
-    ensure!(arguments.runs > 0, "--runs must not be 0");
+    ensure!(arguments.runs > 0, "--runs must be at least 1");
     println!(
         "| Plan | Noise | Exact maps | Complete | Located | Found / missed / doubled / phantom | Radius error, median / 90 % \
-         | Degree told / right | Lost its way | Touched a wall | Frames a place | Journeys arrived / asked / elsewhere |"
+         | Degree seen / right | Way lost | Bumps | Frames per place | Goals reached / commanded / reached elsewhere |"
     );
     println!("|---|---|---|---|---|---|---|---|---|---|---|---|");
     for name in &arguments.plans {
         let plan = load_plan(name)?;
         for &noise in &arguments.noises {
-            let runs: Result<Vec<Run>, _> =
-                (1..=arguments.runs).into_par_iter().map(|seed| one(arguments, &plan, noise, seed)).collect();
+            let runs = parallel::map(arguments.runs, 0, |run| one(arguments, &plan, noise, run as u64 + 1))?;
+            let runs: Result<Vec<Run>, _> = runs.into_iter().collect();
             print_row(name, noise, &runs?, arguments.places);
         }
     }
     Ok(())
+}
+
+/// An angle of incidence.
+fn degrees(text: &str) -> Result<f64, String> {
+    number_in(text, 0.0..=90.0)
 }
 
 fn one(arguments: &Arguments, plan: &Plan, noise: f64, seed: u64) -> anyhow::Result<Run> {
@@ -109,7 +115,7 @@ fn one(arguments: &Arguments, plan: &Plan, noise: f64, seed: u64) -> anyhow::Res
     let score = score_exploration(&exploration);
     let seen: std::collections::BTreeSet<usize> = exploration.nodes().iter().copied().flatten().collect();
     let mut run = Run {
-        report: exploration.journal().report(),
+        report: exploration.ground_truth().report(),
         exact: score.exact,
         complete: seen.len() == exploration.rover().true_map().nodes.len(),
         locations: score.location,
@@ -119,12 +125,12 @@ fn one(arguments: &Arguments, plan: &Plan, noise: f64, seed: u64) -> anyhow::Res
         journeys: Journeys::default(),
     };
     if run.exact && run.complete {
-        run.journeys = travel(&mut exploration, arguments.journeys, seed);
+        run.journeys = travel(&mut exploration, arguments.goals, seed);
     }
     Ok(run)
 }
 
-/// Sends the robot to vertices of its map by commands over its line, and looks where it says that it has arrived.
+/// Commands the robot to vertices of its map over its line, and compares where it stops with the ground truth.
 fn travel(exploration: &mut Exploration<'_>, journeys: u64, seed: u64) -> Journeys {
     let mut outcome = Journeys::default();
     for number in 0..journeys {

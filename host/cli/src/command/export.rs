@@ -11,25 +11,26 @@ use toposlam_link::export;
 use toposlam_link::layout::Layout;
 use toposlam_link::line;
 use toposlam_link::listener::{Event, Listener, Understanding};
-use toposlam_link::log::{self, LogError};
+#[cfg(feature = "recording")]
+use toposlam_link::recording::{self, RecordingError};
 
 /// Arguments of `toposlam export`.
 #[derive(Args)]
 pub(crate) struct Arguments {
-    /// Where the map comes from: a robot's line (a serial port, or tcp:HOST:PORT), a recording of `record` (FILE.mcap), a
-    /// file of the bytes that a robot sent, or - for such bytes from the standard input.
+    /// Source of the map: serial port of a robot, tcp:HOST:PORT, recording (FILE.mcap, feature `recording`), file with the bytes of a
+    /// line, or - for such bytes on the standard input.
     source: String,
-    /// The format.
+    /// Output format.
     #[arg(long)]
     format: Format,
-    /// The file to write; the standard output if not given.
-    #[arg(long)]
+    /// File to write [default: the standard output].
+    #[arg(long, value_name = "FILE")]
     output: Option<PathBuf>,
-    /// The speed of a serial port.
+    /// Baud rate of a serial port.
     #[arg(long, default_value_t = 115_200)]
     baud: u32,
-    /// How long an edge is about in GeoJSON, in metres.
-    #[arg(long, default_value_t = 5.0, value_parser = edge_m)]
+    /// Approximate length of an edge in GeoJSON, in metres, 0.1 to 1000.
+    #[arg(long, value_name = "METRES", default_value_t = 5.0, value_parser = edge_m)]
     edge_m: f64,
 }
 
@@ -43,8 +44,7 @@ enum Format {
 }
 
 fn edge_m(text: &str) -> Result<f64, String> {
-    let edge_m = text.parse().map_err(|error| format!("{error}"))?;
-    if (0.1..=1000.0).contains(&edge_m) { Ok(edge_m) } else { Err("must be 0.1 to 1000".to_owned()) }
+    super::drive::number_in(text, 0.1..=1000.0)
 }
 
 pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
@@ -53,7 +53,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
         eprintln!("{understanding}");
     }
     let map = listener.map();
-    ensure!(!map.vertices.is_empty(), "{}: no map was heard", arguments.source);
+    ensure!(!map.vertices.is_empty(), "{}: no map received", arguments.source);
     let mut layout = Layout::new();
     layout.arrange(&map);
     let points = layout.points();
@@ -107,17 +107,23 @@ fn recorded(mut bytes: impl Read) -> io::Result<Listener> {
 }
 
 /// What is known at the end of a recording.
-fn replayed(path: &Path) -> Result<Listener, LogError> {
+#[cfg(feature = "recording")]
+fn replayed(path: &Path) -> Result<Listener, RecordingError> {
     let mut listener = Listener::new();
-    for bytes in log::frames(path)? {
+    for bytes in recording::frames(path)? {
         listener.feed(&bytes?, |_, _| ());
     }
     complain_of_gaps(&listener);
     Ok(listener)
 }
 
+#[cfg(not(feature = "recording"))]
+fn replayed(_: &Path) -> anyhow::Result<Listener> {
+    anyhow::bail!("this build reads no recordings; add --features recording to `cargo run --release`")
+}
+
 fn complain_of_gaps(listener: &Listener) {
     if !listener.replica().is_complete() || !listener.replica().is_converged() {
-        eprintln!("the map was not heard whole: vertices or edges may be missing");
+        eprintln!("the map is incomplete: vertices or edges may be missing");
     }
 }

@@ -6,9 +6,9 @@ use toposlam_eval::mapping::FilterChoice;
 /// Which filter makes the map.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub(super) enum FilterArgument {
-    /// The robust filter, which the firmware runs.
+    /// Robust filter, as in the firmware.
     Robust,
-    /// The filter of the paper.
+    /// Filter of the paper.
     Paper,
 }
 

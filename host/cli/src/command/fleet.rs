@@ -13,7 +13,7 @@ use toposlam_cli::fleet::{End, Fleet, Robot, Totals};
 use super::interrupt::Interrupt;
 use super::robots::pace;
 
-/// How often what was heard is told.
+/// Interval of the printed figures.
 const REPORT: Duration = Duration::from_secs(1);
 /// How long robots are waited for before what is heard is told.
 const CONNECTING: Duration = Duration::from_secs(5);
@@ -21,16 +21,16 @@ const CONNECTING: Duration = Duration::from_secs(5);
 /// Arguments of `toposlam fleet`.
 #[derive(Args)]
 pub(crate) struct Arguments {
-    /// A file with the line of a robot in each line: tcp:HOST:PORT and, if wanted, its name.
+    /// File with a robot in each line: tcp:HOST:PORT and optionally its name.
     #[arg(required_unless_present = "simulate", conflicts_with = "simulate")]
     lines: Option<PathBuf>,
-    /// Listen to so many recorded robots, which another process lets speak.
-    #[arg(long)]
+    /// Monitor this many recorded robots, which a child process serves.
+    #[arg(long, value_name = "ROBOTS")]
     simulate: Option<u32>,
-    /// Stop after so many seconds; without it, at Ctrl-C or when nobody is connected any more.
+    /// Stop after this many seconds [default: at Ctrl-C, or when no robot is connected any more].
     #[arg(long)]
     seconds: Option<u64>,
-    /// How much faster than real ones recorded robots live; 0: as fast as they are listened to.
+    /// Speed of the recorded robots, 0.01 to 1000 times real time; 0 for as fast as they are read.
     #[arg(long, default_value_t = 1.0, value_parser = pace, requires = "simulate")]
     speed: f64,
 }
@@ -43,7 +43,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
             ((0..count).map(|number| (format!("robot {number}"), address.clone())).collect(), Some(crowd))
         }
         (file, _) => {
-            let file = file.as_deref().context("no file of lines")?;
+            let file = file.as_deref().context("neither a file of lines nor --simulate was given")?;
             let text = std::fs::read_to_string(file).with_context(|| format!("reading {}", file.display()))?;
             (lines_of(&text)?, None)
         }

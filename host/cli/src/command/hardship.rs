@@ -18,10 +18,11 @@ use toposlam::ring::RingFrame;
 use toposlam::wire::{Command, Encoder, MAX_FRAME_BYTES, Message, Outcome, Reply, Request};
 use toposlam::{FaultCounters, FaultKind, Fingerprint};
 use toposlam_cli::emulator::Emulation;
+use toposlam_cli::progress::Progress;
 use toposlam_sim::exploration::Exploration;
 use toposlam_sim::injector::{FaultRates, LineInjector};
 
-use super::drive::{DriveArguments, Summary, progress_bar};
+use super::drive::{DriveArguments, Summary};
 use super::heard::Heard;
 
 /// The world stands still for so long when the firmware does not say where it drives: a fault may have begun a frame for the
@@ -61,7 +62,7 @@ pub(super) fn run(
     // The emulator asks for frames on one thread and hands on what it heard on another.
     let trial = Mutex::new(Trial { exploration, frames: 0, is_over: false });
     let (tell_velocity, velocities) = mpsc::channel::<VelocityCommand>();
-    let bar = progress_bar(places)?;
+    let bar = Progress::new("", places, "places");
     let mut heard = Heard::new();
     let mut line = LineInjector::new(rates, arguments.seed());
     let mut fetch = Fetch::new();
@@ -101,7 +102,7 @@ pub(super) fn run(
                         let ago = turns.saturating_sub(frame_index);
                         let frame_index = trial.frames.saturating_sub(ago + 1);
                         trial.exploration.note(&Place { fingerprint, frame_index, degree, spread_mm: 0 });
-                        bar.inc(1);
+                        bar.increment();
                     }
                     Message::Velocity(drive) => {
                         turns = drive.frame_index.wrapping_add(1);
@@ -128,7 +129,7 @@ pub(super) fn run(
             })
         },
     )?;
-    bar.finish_and_clear();
+    drop(bar);
     let Ok(Trial { mut exploration, .. }) = trial.into_inner() else { bail!("the world failed") };
     ensure!(fetch.is_complete, "the firmware's map did not arrive");
     exploration.robot_mut().restore(&fetch.snapshot, Resume::InPlace).context("the firmware's snapshot")?;

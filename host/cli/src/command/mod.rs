@@ -1,5 +1,5 @@
-//! The subcommands, a file each: its arguments and what it does with them. `drive` is what two of them share,
-//! `filter` what three of them let choose, `hardship` what `emulate` does with faults, `interrupt` Ctrl-C.
+//! The subcommands, a file each: its arguments and what it does with them. `drive` has the options that `simulate` and
+//! `emulate` share, `filter` the choice of a filter, `hardship` the emulation with faults, `interrupt` Ctrl-C.
 
 pub(crate) mod console;
 mod drive;
@@ -12,11 +12,15 @@ pub(crate) mod fleet;
 mod hardship;
 mod heard;
 mod interrupt;
+#[cfg(not(all(feature = "mqtt", feature = "recording")))]
+mod missing;
 pub(crate) mod monitor;
+mod on_graph;
+#[cfg(feature = "recording")]
 pub(crate) mod play;
 #[cfg(feature = "mqtt")]
 pub(crate) mod publish;
-mod rails;
+#[cfg(feature = "recording")]
 pub(crate) mod record;
 pub(crate) mod replay;
 pub(crate) mod robot;
@@ -24,3 +28,8 @@ pub(crate) mod robots;
 pub(crate) mod serve;
 pub(crate) mod simulate;
 pub(crate) mod soak;
+
+#[cfg(not(feature = "mqtt"))]
+pub(crate) use missing::publish;
+#[cfg(not(feature = "recording"))]
+pub(crate) use missing::{play, record};

@@ -13,18 +13,18 @@ use toposlam_link::link::Options;
 /// Arguments of `toposlam monitor`.
 #[derive(Args)]
 pub(crate) struct Arguments {
-    /// The robot's line: a serial port, tcp:HOST:PORT, or - for bytes on the standard input.
+    /// Serial port of the robot, tcp:HOST:PORT, or - for the bytes of its line on the standard input.
     line: String,
-    /// The speed of a serial port.
+    /// Baud rate of a serial port.
     #[arg(long, default_value_t = 115_200)]
     baud: u32,
-    /// Take no keys and draw nothing, but print a line for each event.
+    /// Print a line for each event instead of drawing.
     #[arg(long)]
     headless: bool,
     /// Print each event as a JSON object.
     #[arg(long, requires = "headless")]
     json: bool,
-    /// Stop after this many messages and damages.
+    /// Stop after this many messages and damaged frames.
     #[arg(long, requires = "headless")]
     events: Option<u64>,
     /// Stop after this many seconds.
@@ -38,7 +38,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
         return screen::run(line, baud, options, |_| ControlFlow::Continue(()));
     }
     let time = arguments.seconds.map(Duration::try_from_secs_f64).transpose()?;
-    ensure!(arguments.events != Some(0), "0 events are none to wait for");
+    ensure!(arguments.events != Some(0), "--events must be at least 1");
     let form = if arguments.json { Form::Json } else { Form::Words };
     headless::run(line, baud, options, form, Limits { events: arguments.events, time }, stdout().lock())
 }

@@ -1,4 +1,4 @@
-//! `toposlam play`: hear a recording again, or let others hear it.
+//! `toposlam play`: play a recording back, or serve it as a robot.
 
 use std::fs::File;
 use std::io::Write;
@@ -9,7 +9,7 @@ use anyhow::Context;
 use clap::Args;
 use toposlam_link::broadcast::Broadcast;
 use toposlam_link::listener::Listener;
-use toposlam_link::log::Recording;
+use toposlam_link::recording::Recording;
 
 use super::console::print_map;
 use super::interrupt::Interrupt;
@@ -23,18 +23,18 @@ const FAREWELL: Duration = Duration::from_secs(5);
 /// Arguments of `toposlam play`.
 #[derive(Args)]
 pub(crate) struct Arguments {
-    /// The recording.
+    /// MCAP file written by `record`.
     file: PathBuf,
-    /// Let others hear it at HOST:PORT, in the pace in which it was recorded, from when the first one connects.
-    #[arg(long, conflicts_with = "output")]
+    /// Serve the recorded line at this address in real time, from the first connection.
+    #[arg(long, value_name = "HOST:PORT", conflicts_with = "output")]
     listen: Option<String>,
-    /// Write the bytes of the line, in the pace in which they were recorded, to a file; -: to the standard output.
-    #[arg(long)]
+    /// Write the bytes of the line to a file in real time; - for the standard output.
+    #[arg(long, value_name = "FILE")]
     output: Option<PathBuf>,
-    /// How much faster than it was recorded, 0.01 to 1000.
+    /// Speed, 0.01 to 1000 times real time.
     #[arg(long, default_value_t = 1.0, value_parser = speed)]
     speed: f64,
-    /// Without any pause.
+    /// Write without pauses.
     #[arg(long, conflicts_with_all = ["speed", "listen"])]
     fast: bool,
 }

@@ -16,21 +16,21 @@ const TURN: Duration = Duration::from_millis(50);
 /// Arguments of `toposlam publish`.
 #[derive(Args)]
 pub(crate) struct Arguments {
-    /// The robot's line: a serial port, tcp:HOST:PORT, or - for bytes on the standard input.
+    /// Serial port of the robot, tcp:HOST:PORT, or - for the bytes of its line on the standard input.
     line: String,
-    /// The broker: mqtt://HOST:PORT, or mqtt://USER:PASSWORD@HOST:PORT.
+    /// Broker: mqtt://HOST:PORT, or mqtt://USER:PASSWORD@HOST:PORT.
     #[arg(long)]
     broker: Broker,
-    /// The robot's name: the topics are toposlam/NAME/events, /map and /status.
-    #[arg(long)]
+    /// Name of the robot in the topics toposlam/NAME/events, map and status.
+    #[arg(long, value_name = "NAME")]
     robot: String,
-    /// Publish the frames of the line as well, as toposlam/NAME/frames.
+    /// Also publish the frames of the line as toposlam/NAME/frames.
     #[arg(long)]
     frames: bool,
-    /// The speed of a serial port.
+    /// Baud rate of a serial port.
     #[arg(long, default_value_t = 115_200)]
     baud: u32,
-    /// Stop after so many seconds; without it, at Ctrl-C or at the end of the standard input.
+    /// Stop after this many seconds [default: at Ctrl-C, or at the end of the standard input].
     #[arg(long)]
     seconds: Option<u64>,
 }

@@ -1,4 +1,4 @@
-//! `toposlam record`: keep what a robot says in a file.
+//! `toposlam record`: record the line of a robot in an MCAP file.
 
 use std::io::ErrorKind;
 use std::path::PathBuf;
@@ -7,7 +7,7 @@ use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 use anyhow::Context;
 use clap::Args;
 use toposlam_link::line::{Line, open};
-use toposlam_link::log::Recorder;
+use toposlam_link::recording::Recorder;
 
 use super::interrupt::Interrupt;
 
@@ -16,17 +16,17 @@ const BUFFER_BYTES: usize = 4096;
 /// Arguments of `toposlam record`.
 #[derive(Args)]
 pub(crate) struct Arguments {
-    /// The robot's line: a serial port, or tcp:HOST:PORT.
+    /// Serial port of the robot, or tcp:HOST:PORT.
     line: String,
-    /// The recording, an MCAP file that does not exist yet.
+    /// MCAP file to create; an existing file is an error.
     file: PathBuf,
-    /// The speed of a serial port.
+    /// Baud rate of a serial port.
     #[arg(long, default_value_t = 115_200)]
     baud: u32,
-    /// Stop after so many seconds; without it, at Ctrl-C or at the end of the line.
+    /// Stop after this many seconds [default: at Ctrl-C, or at the end of the line].
     #[arg(long)]
     seconds: Option<u64>,
-    /// Stop when the robot has found so many places.
+    /// Stop after this many places.
     #[arg(long)]
     places: Option<u32>,
 }
@@ -34,7 +34,7 @@ pub(crate) struct Arguments {
 pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     let mut line = open(&arguments.line, arguments.baud)?;
     let file = &arguments.file;
-    let mut recorder = Recorder::create(file).with_context(|| format!("making {}", file.display()))?;
+    let mut recorder = Recorder::create(file).with_context(|| format!("creating {}", file.display()))?;
     let interrupt = Interrupt::watch()?;
     // The clock of the computer may be set meanwhile; the times of the recording go on evenly.
     let start = Instant::now();

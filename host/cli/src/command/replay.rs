@@ -7,27 +7,28 @@ use std::path::PathBuf;
 use anyhow::Context;
 use clap::Args;
 use toposlam::{Map, reference};
+use toposlam_eval::faults::fault_lines;
 use toposlam_eval::graph::Graph;
+use toposlam_eval::gvg_adherence::GvgAdherence;
 use toposlam_eval::laps::{Laps, Named, Shape, Tolerance, Visit};
 use toposlam_eval::mapping::Mapping;
-use toposlam_eval::nearness::Nearness;
-use toposlam_eval::recording::{Ring, fault_lines};
+use toposlam_eval::range_csv::Ring;
 
 use super::filter::FilterArgument;
 
 /// Arguments of `toposlam replay`.
 #[derive(Args)]
 pub(crate) struct Arguments {
-    /// The recording: CSV with a header line and a column for each sonar.
+    /// CSV file with a header line and a column of ranges for each sonar.
     recording: PathBuf,
-    /// The ring's description (TOML); the one of the SCITOS G5 robot is built in as `scitos-g5`.
-    #[arg(long)]
+    /// TOML file that describes the ring, or `scitos-g5` for the built-in one (docs/replay.md).
+    #[arg(long, value_name = "FILE")]
     ring: PathBuf,
-    /// The filter that makes the map.
+    /// Filter that makes the map.
     #[arg(long, value_enum, default_value_t = FilterArgument::Robust)]
     filter: FilterArgument,
-    /// How many frames a lap takes, when the robot drove one round over and over: compares the laps.
-    #[arg(long)]
+    /// Frames per lap of a robot that drove the same round several times; compares the laps.
+    #[arg(long, value_name = "FRAMES")]
     lap_frames: Option<NonZeroU32>,
 }
 
@@ -44,14 +45,14 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     let frames = ring.read(recording).with_context(|| format!("recording {}", arguments.recording.display()))?;
 
     // A smaller ring leaves slots of the frame without a sensor; they are dead in every frame.
-    let mut mapping = Mapping::start(ring.geometry(), arguments.filter.into())?;
+    let mut mapping = Mapping::of_recording(&ring, arguments.filter.into())?;
     for frame in &frames {
         if let Some(step) = mapping.observe(frame, None) {
             println!("{step}");
         }
     }
     println!("\n{} frames, {} places", frames.len(), mapping.steps().len());
-    println!("{}", Nearness::of(&frames, &ring.geometry(), &reference::PLACE));
+    println!("{}", GvgAdherence::of(&frames, &ring.geometry(), &reference::PLACE));
     let path = mapping.path();
     let vertices: Vec<String> = path.iter().map(|vertex| Named(*vertex).to_string()).collect();
     println!("by the final map the places were: {}", vertices.join(" "));

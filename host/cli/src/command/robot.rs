@@ -17,22 +17,22 @@ const FRAMES_PER_SECOND: f64 = 10.0;
 /// Arguments of `toposlam robot`.
 #[derive(Args)]
 pub(crate) struct Arguments {
-    /// Where to listen, HOST:PORT.
+    /// Address to listen at, HOST:PORT; port 0 for any free port.
     #[arg(long, default_value = "127.0.0.1:7070")]
     listen: String,
-    /// Floor plan: ring, office, flat, or a file.
+    /// Floor plan: ring, office, flat, or a text file (docs/driving.md).
     #[arg(long, default_value = "office")]
     plan: String,
-    /// Seed of the drive and of every noise.
+    /// Seed of the drive and of all noise.
     #[arg(long, default_value_t = 1)]
     seed: u64,
-    /// Every noise of the robot, multiplied by this.
+    /// Factor on every noise of the robot, 0 to 100.
     #[arg(long, default_value_t = 1.0, value_parser = noise_factor)]
     noise: f64,
-    /// How much faster than a real robot it lives, 0.01 to 1000.
+    /// Speed, 0.01 to 1000 times real time.
     #[arg(long, default_value_t = 1.0, value_parser = speed)]
     speed: f64,
-    /// Stop after this many places; 0: never.
+    /// Stop after this many places; 0 for never.
     #[arg(long, default_value_t = 0)]
     places: usize,
 }

@@ -17,16 +17,16 @@ const TURN: Duration = Duration::from_millis(5);
 /// Arguments of `toposlam robots`.
 #[derive(Args)]
 pub(crate) struct Arguments {
-    /// How many robots.
+    /// Number of robots.
     #[arg(long, value_parser = clap::value_parser!(u32).range(1..))]
     count: u32,
-    /// Where to listen, HOST:PORT.
+    /// Address to listen at, HOST:PORT.
     #[arg(long, default_value = "127.0.0.1:7070")]
     listen: String,
-    /// How much faster than real robots they live; 0: as fast as they are listened to.
+    /// Speed, 0.01 to 1000 times real time; 0 for as fast as the robots are read.
     #[arg(long, default_value_t = 1.0, value_parser = pace)]
     speed: f64,
-    /// How many ring frames are recorded of each life.
+    /// Ring frames in the recording of each robot.
     #[arg(long, default_value_t = 6000, value_parser = clap::value_parser!(u32).range(1..))]
     frames: u32,
 }

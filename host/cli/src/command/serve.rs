@@ -11,15 +11,15 @@ use toposlam_link::watch::Watch;
 /// Arguments of `toposlam serve`.
 #[derive(Args)]
 pub(crate) struct Arguments {
-    /// The robot's line: a serial port, tcp:HOST:PORT, or - for bytes on the standard input.
+    /// Serial port of the robot, tcp:HOST:PORT, or - for the bytes of its line on the standard input.
     line: String,
-    /// The speed of a serial port.
+    /// Baud rate of a serial port.
     #[arg(long, default_value_t = 115_200)]
     baud: u32,
-    /// Where to serve the page, HOST:PORT; port 0 is any free one.
+    /// Address to serve the page at, HOST:PORT; port 0 for any free port.
     #[arg(long, default_value = "127.0.0.1:8080")]
     listen: String,
-    /// A name of this computer that browsers may call it by, beside its addresses and localhost; may be repeated.
+    /// Host name that browsers may use besides the addresses of this computer and localhost; may be repeated.
     #[arg(long = "name", value_name = "NAME")]
     names: Vec<String>,
 }

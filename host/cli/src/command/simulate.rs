@@ -6,53 +6,54 @@ use anyhow::Context;
 use clap::Args;
 use toposlam::reference::SNAPSHOT_BYTES;
 use toposlam_cli::picture::{Drawing, Step, animate};
+use toposlam_cli::progress::Progress;
 use toposlam_sim::exploration::Exploration;
 use toposlam_sim::world::Detection;
 
-use super::drive::{DriveArguments, Summary, progress_bar};
-use super::rails::{self, OnRails};
+use super::drive::{DriveArguments, Summary};
+use super::on_graph::{self, OnGraph};
 
 /// Arguments of `toposlam simulate`.
 #[derive(Args)]
 pub(crate) struct Arguments {
     #[command(flatten)]
     drive: DriveArguments,
-    /// Drive until this many places were detected.
+    /// Stop after this many detected places.
     #[arg(long, default_value_t = 100)]
     places: usize,
-    /// Stop after this many frames at the latest (10 a second); 0: no limit.
+    /// Stop after this many ring frames (10 per second); 0 for no limit.
     #[arg(long, default_value_t = 1_000_000)]
     frames: u64,
-    /// Write the map as it grows, over the floor plan, as an animated SVG.
-    #[arg(long, value_name = "FILE", conflicts_with = "on_rails")]
+    /// Write the growing map over the floor plan to an animated SVG file.
+    #[arg(long, value_name = "FILE", conflicts_with = "on_graph")]
     animate: Option<PathBuf>,
     #[command(flatten)]
-    rails: OnRails,
+    on_graph: OnGraph,
 }
 
 pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
-    let Arguments { drive, places, frames, animate: animation, rails } = arguments;
-    if rails.on_rails {
-        return rails::run(drive, rails, *places, *frames);
+    let Arguments { drive, places, frames, animate: animation, on_graph } = arguments;
+    if on_graph.on_graph {
+        return on_graph::run(drive, on_graph, *places, *frames);
     }
     let (plan, model) = drive.world()?;
     let mut buffer = [0; SNAPSHOT_BYTES];
     let mut exploration = Exploration::start(&plan, model, drive.seed(), &mut buffer)?;
-    let progress = progress_bar(*places)?;
+    let progress = Progress::new("", *places, "places");
     let (mut way, mut steps) = (Vec::new(), Vec::new());
     while exploration.places() < *places && (*frames == 0 || exploration.frames() < *frames) {
         if exploration.advance().is_some()
             && let Some(step) = exploration.steps().last()
         {
-            progress.suspend(|| println!("{step}"));
-            progress.inc(1);
+            progress.println(step);
+            progress.increment();
             if animation.is_some() {
                 steps.push(map_now(drive.plan(), &exploration, way.len()));
             }
         }
         way.push(exploration.rover().position());
     }
-    progress.finish_and_clear();
+    drop(progress);
     drive.summarise(&Summary::of(&plan, &exploration))?;
     if let Some(file) = animation {
         let picture = animate(&plan, &way, &steps);
@@ -66,7 +67,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
 fn map_now(plan: &str, exploration: &Exploration<'_>, driven: usize) -> Step {
     let truth = exploration.rover().true_map();
     let detections: Vec<Detection> = exploration
-        .journal()
+        .ground_truth()
         .detections()
         .iter()
         .map(|detection| {

@@ -11,20 +11,21 @@ use super::drive::{fault_rate, load_plan, noise_factor};
 /// Arguments of `toposlam soak`.
 #[derive(Args)]
 pub(crate) struct Arguments {
-    /// Floor plan: ring, office, flat, or a file.
+    /// Floor plan: ring, office, flat, or a text file (docs/driving.md).
     #[arg(long, default_value = "office")]
     plan: String,
-    /// Seed of the world, of every noise and of the faults.
+    /// Seed of the world, of all noise and of the faults.
     #[arg(long, default_value_t = 1)]
     seed: u64,
-    /// Every noise of the robot, multiplied by this.
+    /// Factor on every noise of the robot, 0 to 100.
     #[arg(long, default_value_t = 1.0, value_parser = noise_factor)]
     noise: f64,
-    /// Simulated hours, ten turns of the robot's loop a second.
+    /// Simulated hours; the main loop runs 10 times per second.
     #[arg(long, default_value_t = 24)]
     hours: u64,
-    /// Faults of the ring and the line, 0 to 1: the probability that a sonar's answer is lost; the others follow (docs/faults.md).
-    #[arg(long, default_value_t = 0.01, value_parser = fault_rate)]
+    /// Fault rate of the ring and the line, 0 to 1: the probability that a sonar echo is lost. Every other rate is proportional to it
+    /// (docs/faults.md).
+    #[arg(long, value_name = "RATE", default_value_t = 0.01, value_parser = fault_rate)]
     faults: f64,
 }
 
@@ -38,6 +39,6 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     }
     let mistakes = life.mistakes();
     ensure!(mistakes.is_empty(), "{}", mistakes.join("; "));
-    println!("nothing was lost, and every fault that can be counted was counted");
+    println!("no place was lost, and every injected fault that can be counted was counted");
     Ok(())
 }

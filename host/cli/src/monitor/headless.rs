@@ -8,7 +8,7 @@ use anyhow::{Context, ensure};
 use serde_json::{Value, json};
 
 use toposlam_link::link::{Link, News, Options, Source};
-use toposlam_link::{json, wording};
+use toposlam_link::{event_text, json};
 
 /// News that wait to be written; a link that has more to say waits.
 const QUEUE: usize = 1024;
@@ -84,7 +84,7 @@ fn in_words(news: &News, name: &str) -> String {
         News::Connected => format!("connected to {name}"),
         News::Disconnected(reason) => format!("no line to {name}: {reason}; trying again"),
         News::Ended => "the input has ended".to_owned(),
-        News::Heard(event, _) => wording::event(event.into()),
+        News::Heard(event, _) => event_text::event(event.into()),
         News::Answered(task, answer) => format!("{task}: {answer:?}"),
     }
 }

@@ -10,9 +10,9 @@ use toposlam::FaultKind;
 use toposlam::wire::{Arrival, Command, Header, Info, Message, Outcome};
 
 use super::prompt::{Prompt, Question};
+use toposlam_link::event_text;
 use toposlam_link::link::{Answer, News, Task, TaskError};
 use toposlam_link::watch::Watch;
-use toposlam_link::wording;
 
 const LOG_LINES: usize = 200;
 
@@ -123,8 +123,10 @@ impl Model {
             Arrival::First | Arrival::InOrder | Arrival::AfterGap { .. } => {}
         }
         match message {
-            Message::Remapped(_) | Message::GoalStatus(_) => self.note(wording::message(message)),
-            Message::Fault { kind, count } if self.is_news(*kind, *count) => self.complain(wording::message(message)),
+            Message::Remapped(_) | Message::GoalStatus(_) => self.note(event_text::message(message)),
+            Message::Fault { kind, count } if self.is_news(*kind, *count) => {
+                self.complain(event_text::message(message))
+            }
             _ => {}
         }
     }
@@ -137,7 +139,7 @@ impl Model {
         match answer {
             Ok(Answer::Outcome(Outcome::Refused(refusal))) => self.complain(format!("{task}: refused: {refusal}")),
             Ok(Answer::Outcome(outcome)) => {
-                self.note(format!("{task}: {}", wording::outcome(outcome)));
+                self.note(format!("{task}: {}", event_text::outcome(outcome)));
                 match (task, outcome) {
                     (_, Outcome::Info(info)) => {
                         let (paused, localise_only) = (Some(info.paused), Some(info.localise_only));

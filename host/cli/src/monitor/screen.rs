@@ -54,7 +54,7 @@ pub fn run(
     let ended = Arc::new(AtomicBool::new(false));
     #[cfg(unix)]
     for signal in [signal_hook::consts::SIGTERM, signal_hook::consts::SIGHUP, signal_hook::consts::SIGINT] {
-        signal_hook::flag::register(signal, Arc::clone(&ended)).context("listening to signals")?;
+        signal_hook::flag::register(signal, Arc::clone(&ended)).context("installing the signal handlers")?;
     }
     let mut screen = Screen::enter().context("taking over the terminal")?;
     let (sender, inputs) = sync_channel(QUEUE);

@@ -143,7 +143,7 @@ fn another_version_is_a_banner_and_other_messages_an_alarm() {
     let mut watch = Watch::new("tcp:robot:7070");
     watch.hear(&Message::Hello(hello()));
     let screen = watch.screen(100, 30);
-    assert!(!screen.contains("version") && screen.contains("start 3 (the watchdog was not fed)"), "{screen}");
+    assert!(!screen.contains("version") && screen.contains("start 3 (the watchdog was not fed in time)"), "{screen}");
     let theirs = PROTOCOL_VERSION + 1;
     watch.hear(&Message::Hello(Hello { protocol_version: theirs, ..hello() }));
     let screen = watch.screen(100, 30);
@@ -294,15 +294,15 @@ fn nothing_can_be_told_on_the_standard_input() {
 }
 
 #[test]
-fn journeys_and_new_numbers_are_told() {
+fn goals_and_remapped_vertices_are_shown() {
     let mut watch = Watch::new("tcp:robot:7070");
     watch.hear(&Message::Vertex { vertex: 0, radius_mm: 700, visits: 1 });
     watch.hear(&Message::Vertex { vertex: 1, radius_mm: 900, visits: 1 });
     watch.hear(&Message::GoalStatus(GoalStatus { vertex: 1, state: GoalState::Active }));
-    assert!(watch.screen(120, 40).contains("way to vertex 1: under way"));
+    assert!(watch.screen(120, 40).contains("goal vertex 1: active"));
     watch.hear(&Message::Remapped(Remapped { place_index: 2, vertices: toposlam::wire::List::new([1, 0]) }));
     let screen = watch.screen(120, 40);
-    assert!(screen.contains("0 is 1, 1 is 0") && screen.contains("way to vertex 0: under way"), "{screen}");
+    assert!(screen.contains("0 is 1, 1 is 0") && screen.contains("goal vertex 0: active"), "{screen}");
 }
 
 #[test]

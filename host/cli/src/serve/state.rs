@@ -16,7 +16,7 @@ use toposlam::FaultKind;
 
 use toposlam_link::listener::{Listener, Understanding};
 use toposlam_link::watch::{Connection, Watch};
-use toposlam_link::{json, wording};
+use toposlam_link::{event_text, json};
 
 /// Both parts.
 #[derive(Clone, Debug, PartialEq)]
@@ -70,7 +70,7 @@ fn map(watch: &Watch) -> Value {
         "evidence": evidence.map(|evidence| json!({
             "place_index": evidence.place_index,
             "consistency_mm": finite_mm(evidence.consistency_mm),
-            "lead_nats": thousandths(wording::nats(evidence.lead_q16)),
+            "lead_nats": thousandths(event_text::nats(evidence.lead_q16)),
             "distinct_hypotheses": evidence.distinct_hypotheses,
         })),
         "worst": replica.worst().map(|worst| json!({
@@ -97,7 +97,7 @@ fn live(listener: &Listener) -> Value {
             "frame_index": drive.frame_index,
             "heading_mrad": drive.heading_mrad,
             "speed_permille": drive.speed_permille,
-            "doing": wording::drive_state(drive.state),
+            "doing": event_text::drive_state(drive.state),
         })),
         "line": {
             "messages": counters.messages,

@@ -69,7 +69,7 @@ fn headless_json_is_an_object_a_line_and_ends_after_so_many_events() {
     let events: Vec<Value> = text.lines().map(|line| serde_json::from_str(line).unwrap()).collect();
     assert_eq!(events.len(), 101, "{text}");
     assert_eq!((&events[0]["event"], &events[0]["line"]), (&"Connected".into(), &robot.line.as_str().into()));
-    let drives = events.iter().filter(|event| event["event"] == "Drive" && event["heading_mrad"].is_i64());
+    let drives = events.iter().filter(|event| event["event"] == "Velocity" && event["heading_mrad"].is_i64());
     assert!(drives.count() > 10, "{text}");
 }
 

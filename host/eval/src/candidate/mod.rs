@@ -1,4 +1,4 @@
-//! The filters that can be evaluated, behind one interface, each with the smallest capacities that will do.
+//! The filters that can be evaluated, behind one interface, with capacities of which each is a few seconds of compiling.
 
 mod paper;
 mod robust;
@@ -23,11 +23,11 @@ pub const MAX_NGRAMS: usize = 8192;
 pub trait Candidate {
     /// Takes the next place.
     fn observe(&mut self, observation: Observation);
-    /// Goes on thinking for so many slices of the time between two places.
-    fn polish(&mut self, slices: u32);
-    /// Where a search of so many slices ends that starts at a path, given as a vertex for each place so far: map and path.
+    /// Runs `steps` refinement steps.
+    fn refine(&mut self, steps: u32);
+    /// Map and path at the end of a search of `steps` refinement steps from a path, given as a vertex for each place so far.
     /// `None` for a filter that does not search.
-    fn search_from(&self, path: &[VertexId], slices: u32) -> Option<(Map<VERTICES>, Vec<usize>)>;
+    fn search_from(&self, path: &[VertexId], steps: u32) -> Option<(Map<VERTICES>, Vec<usize>)>;
     /// The best map.
     fn map(&self) -> Map<VERTICES>;
     /// The vertex of the best map that each of the newest `places` places is taken for, the oldest first.
@@ -62,7 +62,7 @@ pub fn choose(settings: &Settings, explored: usize) -> Result<Start, EvaluationE
                 let error = ConfigError::OutOfRange { field: "ngram_length", value, min: wanted, max: wanted };
                 return Err(EvaluationError::Config(error));
             }
-            paper::choose(config.particles.into(), settings, ngrams)
+            paper::choose(settings, ngrams)
         }
         Filter::Robust(config) => {
             config.check(MAX_HYPOTHESES).map_err(EvaluationError::Config)?;

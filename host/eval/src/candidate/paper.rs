@@ -1,6 +1,6 @@
 //! The paper's filter as a candidate, with the n-grams of its own history or of a prior.
 
-use super::{Candidate, Start, VERTICES};
+use super::{Candidate, MAX_HYPOTHESES, Start, VERTICES};
 use crate::{
     ancestry::Ancestry,
     prior::{PriorSource, path_prior, table_prior},
@@ -13,38 +13,29 @@ use toposlam::{Config, FaultKind, Fingerprint, Map, Observation, PaperFilter, Pr
 /// How many places a path can visit without a prior.
 pub(super) const MAX_PLACES: usize = 2048;
 
-pub(super) fn choose(particles: usize, settings: &Settings, ngrams: usize) -> Result<Start, EvaluationError> {
-    match particles {
-        0..=10 => with_particles::<10>(settings, ngrams),
-        11..=32 => with_particles::<32>(settings, ngrams),
-        _ => with_particles::<100>(settings, ngrams),
-    }
-}
-
-fn with_particles<const N: usize>(settings: &Settings, ngrams: usize) -> Result<Start, EvaluationError> {
+pub(super) fn choose(settings: &Settings, ngrams: usize) -> Result<Start, EvaluationError> {
     if settings.prior == PriorSource::None {
         // A word of history holds 32 places.
         return match settings.longest() {
-            0..=256 => Ok(Online::<N, 8>::start),
-            257..=MAX_PLACES => Ok(Online::<N, 64>::start),
+            0..=256 => Ok(Online::<8>::start),
+            257..=MAX_PLACES => Ok(Online::<64>::start),
             _ => Err(EvaluationError::PathTooLong { most: MAX_PLACES }),
         };
     }
     // A word of a table holds 16 n-grams.
     match ngrams {
-        0..=512 => Ok(Informed::<N, 32>::start),
-        513..=1024 => Ok(Informed::<N, 64>::start),
-        _ => Ok(Informed::<N, 512>::start),
+        0..=1024 => Ok(Informed::<64>::start),
+        _ => Ok(Informed::<512>::start),
     }
 }
 
 /// The filter and the paths of its particles.
-struct Particles<const N: usize, const WORDS: usize> {
-    filter: Box<PaperFilter<N, VERTICES, WORDS>>,
+struct Particles<const WORDS: usize> {
+    filter: Box<PaperFilter<MAX_HYPOTHESES, VERTICES, WORDS>>,
     ancestry: Ancestry,
 }
 
-impl<const N: usize, const WORDS: usize> Particles<N, WORDS> {
+impl<const WORDS: usize> Particles<WORDS> {
     fn start(settings: &Settings, trial: &Trial) -> Self {
         let mut filter = Box::new(PaperFilter::new());
         let config = if let Filter::Paper(config) = settings.filter { config } else { Config::DEFAULT };
@@ -68,23 +59,23 @@ impl<const N: usize, const WORDS: usize> Particles<N, WORDS> {
 }
 
 /// Without a prior: the n-grams are those of the path so far.
-struct Online<const N: usize, const WORDS: usize>(Particles<N, WORDS>);
+struct Online<const WORDS: usize>(Particles<WORDS>);
 
-impl<const N: usize, const WORDS: usize> Online<N, WORDS> {
+impl<const WORDS: usize> Online<WORDS> {
     fn start(settings: &Settings, trial: &Trial) -> Box<dyn Candidate> {
         Box::new(Self(Particles::start(settings, trial)))
     }
 }
 
-impl<const N: usize, const WORDS: usize> Candidate for Online<N, WORDS> {
+impl<const WORDS: usize> Candidate for Online<WORDS> {
     fn observe(&mut self, observation: Observation) {
         self.0.filter.observe(observation.fingerprint);
         self.0.advance();
     }
 
-    fn polish(&mut self, _slices: u32) {}
+    fn refine(&mut self, _steps: u32) {}
 
-    fn search_from(&self, _path: &[VertexId], _slices: u32) -> Option<(Map<VERTICES>, Vec<usize>)> {
+    fn search_from(&self, _path: &[VertexId], _steps: u32) -> Option<(Map<VERTICES>, Vec<usize>)> {
         None
     }
 
@@ -102,26 +93,26 @@ impl<const N: usize, const WORDS: usize> Candidate for Online<N, WORDS> {
 }
 
 /// With a prior. The filter then does not look at its own history, so the shortest will do.
-struct Informed<const N: usize, const WORDS: usize> {
-    particles: Particles<N, 1>,
+struct Informed<const WORDS: usize> {
+    particles: Particles<1>,
     prior: Box<Prior<VERTICES, WORDS>>,
 }
 
-impl<const N: usize, const WORDS: usize> Informed<N, WORDS> {
+impl<const WORDS: usize> Informed<WORDS> {
     fn start(settings: &Settings, trial: &Trial) -> Box<dyn Candidate> {
         Box::new(Self { particles: Particles::start(settings, trial), prior: prior(settings, trial) })
     }
 }
 
-impl<const N: usize, const WORDS: usize> Candidate for Informed<N, WORDS> {
+impl<const WORDS: usize> Candidate for Informed<WORDS> {
     fn observe(&mut self, observation: Observation) {
         self.particles.filter.observe_with_prior(observation.fingerprint, &mut self.prior);
         self.particles.advance();
     }
 
-    fn polish(&mut self, _slices: u32) {}
+    fn refine(&mut self, _steps: u32) {}
 
-    fn search_from(&self, _path: &[VertexId], _slices: u32) -> Option<(Map<VERTICES>, Vec<usize>)> {
+    fn search_from(&self, _path: &[VertexId], _steps: u32) -> Option<(Map<VERTICES>, Vec<usize>)> {
         None
     }
 

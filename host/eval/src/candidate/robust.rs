@@ -1,6 +1,6 @@
 //! The robust filter as a candidate.
 
-use super::{Candidate, Start, VERTICES};
+use super::{Candidate, MAX_HYPOTHESES, Start, VERTICES};
 use crate::{
     settings::{EvaluationError, Filter, Settings},
     trial::Trial,
@@ -12,20 +12,12 @@ const ROBUST_VERTICES: usize = 32;
 /// How many places the n-grams of the prior and the path can have together.
 const MAX_HISTORY: usize = 16384;
 
-/// `places` is how many places the n-grams and the path have together.
+/// `places` is how many places the n-grams and the path have together. Each filter here takes seconds to compile, so there is one
+/// for the usual case and one for the largest.
 pub(super) fn choose(hypotheses: usize, places: usize) -> Result<Start, EvaluationError> {
-    match hypotheses {
-        0..=10 => with_hypotheses::<10>(places),
-        11..=32 => with_hypotheses::<32>(places),
-        _ => with_hypotheses::<100>(places),
-    }
-}
-
-fn with_hypotheses<const N: usize>(places: usize) -> Result<Start, EvaluationError> {
-    match places {
-        0..=512 => Ok(Robust::<N, 512>::start),
-        513..=4096 => Ok(Robust::<N, 4096>::start),
-        4097..=MAX_HISTORY => Ok(Robust::<N, MAX_HISTORY>::start),
+    match (hypotheses, places) {
+        (0..=10, 0..=512) => Ok(Robust::<10, 512>::start),
+        (_, 0..=MAX_HISTORY) => Ok(Robust::<MAX_HYPOTHESES, MAX_HISTORY>::start),
         _ => Err(EvaluationError::PathTooLong { most: MAX_HISTORY }),
     }
 }
@@ -50,14 +42,14 @@ impl<const N: usize, const HISTORY: usize> Candidate for Robust<N, HISTORY> {
         self.0.observe(observation);
     }
 
-    fn polish(&mut self, slices: u32) {
-        (0..slices).for_each(|_| self.0.polish());
+    fn refine(&mut self, steps: u32) {
+        (0..steps).for_each(|_| self.0.polish());
     }
 
-    fn search_from(&self, path: &[VertexId], slices: u32) -> Option<(Map<VERTICES>, Vec<usize>)> {
+    fn search_from(&self, path: &[VertexId], steps: u32) -> Option<(Map<VERTICES>, Vec<usize>)> {
         let mut search = Self(self.0.clone());
         search.0.assume_path(path)?;
-        search.polish(slices);
+        search.refine(steps);
         search.0.refresh();
         Some((search.map(), search.path(path.len())))
     }

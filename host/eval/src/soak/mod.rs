@@ -25,8 +25,8 @@ use toposlam::ring::{Echo, RingFrame};
 use toposlam::wire::{Command, Decoder, Inbox, Message, Outcome, Payload, Progress, Request};
 use toposlam::{FaultCounters, FaultKind};
 
+use crate::faults::fault_lines;
 use crate::mapping::score_exploration;
-use crate::recording::fault_lines;
 use crate::score::MapScore;
 use operator::Operator;
 use toposlam_sim::exploration::Exploration;

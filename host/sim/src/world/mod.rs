@@ -3,34 +3,34 @@
 //! ```
 //! use toposlam::place::{PlaceConfig, PlaceDetector};
 //! use toposlam::ring::RingGeometry;
-//! use toposlam_sim::world::{Journal, Plan, RobotModel, SONARS, Simulation};
+//! use toposlam_sim::world::{GroundTruth, Plan, RobotModel, SONARS, Simulation};
 //!
 //! let plan = Plan::built_in("ring").expect("it is built in");
 //! let mut simulation = Simulation::new(&plan, RobotModel::default(), 7)?;
-//! let mut journal = Journal::new(simulation.true_map());
+//! let mut ground_truth = GroundTruth::new(simulation.true_map());
 //! let mut detector = PlaceDetector::<SONARS>::new();
 //! detector.start(PlaceConfig::DEFAULT, RingGeometry::even())?;
 //! for (frame, truth) in simulation.by_ref().take(2000) {
-//!     journal.drive(&truth);
+//!     ground_truth.drive(&truth);
 //!     if let Some(place) = detector.observe(&frame) {
-//!         journal.detect(&place);
+//!         ground_truth.detect(&place);
 //!     }
 //! }
-//! assert!(journal.report().found > 0);
+//! assert!(ground_truth.report().found > 0);
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
-mod journal;
+mod ground_truth;
 mod plan;
+mod ray_casting;
 mod rover;
-mod sight;
 mod simulation;
 mod voronoi;
 
-pub use journal::{Detection, Journal, Report};
+pub use ground_truth::{Detection, GroundTruth, Report};
 pub use plan::{Plan, PlanError};
+pub use ray_casting::{SONARS, SonarModel};
 pub use rover::{BodyModel, Rover};
-pub use sight::{SONARS, SonarModel};
 pub use simulation::{Pose, RobotModel, Simulation, Truth};
 pub use voronoi::{TrueEdge, TrueMap, TrueNode, VoronoiError};
 

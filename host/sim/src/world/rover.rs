@@ -6,7 +6,7 @@ use rand_xoshiro::Xoshiro256PlusPlus;
 use toposlam::drive::{VelocityCommand, WheelSpeeds, WheelsConfig};
 use toposlam::ring::RingFrame;
 
-use super::sight::{SONARS, Scene, wrapped};
+use super::ray_casting::{SONARS, Scene, wrapped};
 use super::{Plan, Point, Pose, RobotModel, TrueMap, Truth, VoronoiError};
 
 /// The robot is at a true node within this distance, in millimetres.

@@ -8,7 +8,7 @@ use rand_xoshiro::Xoshiro256PlusPlus;
 use toposlam::Turn;
 use toposlam::ring::RingFrame;
 
-use super::sight::{SONARS, Scene, SonarModel, wrapped};
+use super::ray_casting::{SONARS, Scene, SonarModel, wrapped};
 use super::{Plan, Point, TrueEdge, TrueMap, VoronoiError};
 
 /// Where the robot is and where it looks.

@@ -6,7 +6,7 @@ use ratatui::text::{Line, Span};
 
 use super::{FAINT, HERE, boxed};
 use crate::monitor::model::Model;
-use toposlam_link::wording::{distance, factors, nats};
+use toposlam_link::event_text::{distance, factors, nats};
 
 pub(super) fn draw(frame: &mut Frame<'_>, area: Rect, model: &Model) {
     let listener = model.watch().listener();

@@ -8,7 +8,7 @@ use toposlam::FaultKind;
 
 use super::{BAD, FAINT, GOOD, boxed};
 use crate::monitor::model::Model;
-use toposlam_link::wording::{drive_state, seconds};
+use toposlam_link::event_text::{drive_state, seconds};
 
 pub(super) fn draw(frame: &mut Frame<'_>, area: Rect, model: &Model) {
     let listener = model.watch().listener();
@@ -20,7 +20,7 @@ pub(super) fn draw(frame: &mut Frame<'_>, area: Rect, model: &Model) {
         lines.push(Line::from(format!("heading {heading_deg:.0}°, {speed}‰: {}", drive_state(drive.state))));
     }
     if let Some(goal_status) = picture.goal_status() {
-        lines.push(Line::from(format!("way to vertex {}: {}", goal_status.vertex, goal_status.state)));
+        lines.push(Line::from(format!("goal vertex {}: {}", goal_status.vertex, goal_status.state)));
     }
     lines.extend(told(model));
     lines.push(faults(model));

@@ -11,7 +11,7 @@ use prost_types::{
 };
 use serde_json::Value;
 
-use super::LogError;
+use super::RecordingError;
 
 /// A chunk of the file ends when it has lasted this long: a recording that is killed lacks no more than that.
 const CHUNK_NS: u64 = 5_000_000_000;
@@ -102,7 +102,7 @@ pub(super) struct Topics<FILE: Write> {
 }
 
 impl<FILE: Write> Topics<FILE> {
-    pub(super) fn create(file: FILE) -> Result<Self, LogError> {
+    pub(super) fn create(file: FILE) -> Result<Self, RecordingError> {
         // Without seeking, a chunk goes to the file at once and whole.
         let options = WriteOptions::new()
             .library(concat!("toposlam ", env!("CARGO_PKG_VERSION")))
@@ -121,11 +121,11 @@ impl<FILE: Write> Topics<FILE> {
         Ok(Self { file, channels, chunk_began_ns: None })
     }
 
-    pub(super) fn frame(&mut self, time_ns: u64, sequence: u32, bytes: &Vec<u8>) -> Result<(), LogError> {
+    pub(super) fn frame(&mut self, time_ns: u64, sequence: u32, bytes: &Vec<u8>) -> Result<(), RecordingError> {
         self.write(Topic::Frames, time_ns, sequence, &bytes.encode_to_vec())
     }
 
-    pub(super) fn event(&mut self, time_ns: u64, sequence: u32, event: &Value) -> Result<(), LogError> {
+    pub(super) fn event(&mut self, time_ns: u64, sequence: u32, event: &Value) -> Result<(), RecordingError> {
         self.write(Topic::Events, time_ns, sequence, event.to_string().as_bytes())
     }
 
@@ -135,11 +135,11 @@ impl<FILE: Write> Topics<FILE> {
         time_ns: u64,
         sequence: u32,
         message: &impl Message,
-    ) -> Result<(), LogError> {
+    ) -> Result<(), RecordingError> {
         self.write(topic, time_ns, sequence, &message.encode_to_vec())
     }
 
-    fn write(&mut self, topic: Topic, time_ns: u64, sequence: u32, data: &[u8]) -> Result<(), LogError> {
+    fn write(&mut self, topic: Topic, time_ns: u64, sequence: u32, data: &[u8]) -> Result<(), RecordingError> {
         let began_ns = *self.chunk_began_ns.get_or_insert(time_ns);
         if time_ns.saturating_sub(began_ns) >= CHUNK_NS {
             self.file.flush()?;
@@ -154,7 +154,7 @@ impl<FILE: Write> Topics<FILE> {
         Ok(self.file.write_to_known_channel(&header, data)?)
     }
 
-    pub(super) fn finish(mut self) -> Result<(), LogError> {
+    pub(super) fn finish(mut self) -> Result<(), RecordingError> {
         self.file.finish()?;
         Ok(self.file.into_inner().into_inner().flush()?)
     }

@@ -2,10 +2,10 @@
 //!
 //! ```
 //! use toposlam::wire::Message;
-//! use toposlam_link::wording;
+//! use toposlam_link::event_text;
 //!
 //! let seen = Message::Place { place_index: 3, frame_index: 210, radius_mm: 1172, degree: Some(3) };
-//! assert_eq!(wording::message(&seen), "place 3: radius 1172 mm, 3 ways, in frame 210");
+//! assert_eq!(event_text::message(&seen), "place 3: radius 1172 mm, 3 ways, in frame 210");
 //! ```
 
 use toposlam::FaultKind;
@@ -92,7 +92,7 @@ pub fn info(info: &Info) -> Vec<String> {
         format!("up for {:.1} s", seconds(info.uptime_ms)),
         format!("{}{mapping}", if info.paused { "paused; otherwise it " } else { "" }),
     ];
-    lines.extend(info.goal.map(|vertex| format!("on the way to vertex {vertex}")));
+    lines.extend(info.goal.map(|vertex| format!("driving to vertex {vertex}")));
     lines.push(match info.stored_bytes {
         0 => "no snapshot stored".to_owned(),
         bytes => format!("snapshot of {bytes} bytes stored {} places ago", info.stored_places_ago),

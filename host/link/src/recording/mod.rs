@@ -5,7 +5,7 @@
 //!
 //! ```
 //! use toposlam::wire::{Encoder, MAX_FRAME_BYTES, Message};
-//! use toposlam_link::{listener::Listener, log::{Recorder, Recording}};
+//! use toposlam_link::{listener::Listener, recording::{Recorder, Recording}};
 //!
 //! let mut buffer = [0; MAX_FRAME_BYTES];
 //! let edge = Encoder::new(0).encode(&Message::Edge { a: 0, b: 1, present: true }, &mut buffer)?;
@@ -24,8 +24,8 @@
 //! ```
 
 mod error;
+mod reader;
 mod recorder;
-mod recording;
 mod scene;
 #[cfg(test)]
 mod tests;
@@ -33,9 +33,9 @@ mod topics;
 
 use std::path::Path;
 
-pub use error::LogError;
+pub use error::RecordingError;
+pub use reader::{Recording, TimedFrame};
 pub use recorder::{Recorder, Summary};
-pub use recording::{Recording, TimedFrame};
 pub use scene::{MAP_FRAME, METRES_PER_EDGE, ROBOT_FRAME};
 pub use topics::Topic;
 
@@ -44,6 +44,6 @@ pub use topics::Topic;
 ///
 /// # Errors
 /// When the file cannot be opened; then each item as [`Recording`]'s.
-pub fn frames(path: &Path) -> Result<impl Iterator<Item = Result<Vec<u8>, LogError>> + use<>, LogError> {
+pub fn frames(path: &Path) -> Result<impl Iterator<Item = Result<Vec<u8>, RecordingError>> + use<>, RecordingError> {
     Ok(Recording::open(path)?.map(|frame| frame.map(|frame| frame.bytes)))
 }

@@ -8,7 +8,7 @@ use foxglove::messages::{Log, log::Level};
 use toposlam::FaultKind;
 use toposlam::wire::{Arrival, Message};
 
-use super::LogError;
+use super::RecordingError;
 use super::scene::{Scene, scan, timestamp};
 use super::topics::{Topic, Topics};
 use crate::json;
@@ -53,7 +53,7 @@ impl Recorder<BufWriter<File>> {
     ///
     /// # Errors
     /// When the file exists or cannot be written.
-    pub fn create(path: &Path) -> Result<Self, LogError> {
+    pub fn create(path: &Path) -> Result<Self, RecordingError> {
         Self::new(BufWriter::new(File::create_new(path)?))
     }
 }
@@ -63,7 +63,7 @@ impl<FILE: Write> Recorder<FILE> {
     ///
     /// # Errors
     /// When the file cannot be written.
-    pub fn new(file: FILE) -> Result<Self, LogError> {
+    pub fn new(file: FILE) -> Result<Self, RecordingError> {
         Ok(Self {
             notes: Notes {
                 topics: Topics::create(file)?,
@@ -83,7 +83,7 @@ impl<FILE: Write> Recorder<FILE> {
     ///
     /// # Errors
     /// When the file cannot be written. It then ends with the last chunk that was whole.
-    pub fn hear(&mut self, bytes: &[u8], time_ns: u64) -> Result<(), LogError> {
+    pub fn hear(&mut self, bytes: &[u8], time_ns: u64) -> Result<(), RecordingError> {
         self.newest_ns = time_ns;
         for &byte in bytes {
             self.piece.push(byte);
@@ -94,7 +94,7 @@ impl<FILE: Write> Recorder<FILE> {
         self.notes.draw(&self.listener, time_ns)
     }
 
-    fn take_in(&mut self, time_ns: u64) -> Result<(), LogError> {
+    fn take_in(&mut self, time_ns: u64) -> Result<(), RecordingError> {
         let Self { notes, listener, piece, summary, newest_ns: _ } = self;
         notes.topics.frame(time_ns, summary.frames, piece)?;
         summary.frames = summary.frames.wrapping_add(1);
@@ -124,7 +124,7 @@ impl<FILE: Write> Recorder<FILE> {
     ///
     /// # Errors
     /// When the file cannot be written.
-    pub fn finish(mut self) -> Result<Summary, LogError> {
+    pub fn finish(mut self) -> Result<Summary, RecordingError> {
         let time_ns = self.newest_ns;
         if !self.piece.is_empty() {
             self.take_in(time_ns)?;
@@ -152,7 +152,7 @@ struct Drawn {
 }
 
 impl<FILE: Write> Notes<FILE> {
-    fn note(&mut self, event: Event<'_>, time_ns: u64) -> Result<(), LogError> {
+    fn note(&mut self, event: Event<'_>, time_ns: u64) -> Result<(), RecordingError> {
         let Event::Message(header, message) = event else {
             return self.topics.event(time_ns, 0, &json::event(event));
         };
@@ -171,7 +171,7 @@ impl<FILE: Write> Notes<FILE> {
     }
 
     /// The robot repeats its counts; only one that has grown is told.
-    fn fault(&mut self, kind: u8, count: u32, time_ns: u64) -> Result<(), LogError> {
+    fn fault(&mut self, kind: u8, count: u32, time_ns: u64) -> Result<(), RecordingError> {
         let known = self.faults.get_mut(usize::from(kind));
         if known.as_deref() == Some(&count) {
             return Ok(());
@@ -190,12 +190,12 @@ impl<FILE: Write> Notes<FILE> {
         self.topics.message(Topic::Log, time_ns, kind.into(), &log)
     }
 
-    fn draw(&mut self, listener: &Listener, time_ns: u64) -> Result<(), LogError> {
+    fn draw(&mut self, listener: &Listener, time_ns: u64) -> Result<(), RecordingError> {
         let is_soon = |drawn: &Drawn| time_ns.saturating_sub(drawn.time_ns) < DRAWING_PERIOD_NS;
         if self.drawn.as_ref().is_some_and(is_soon) { Ok(()) } else { self.redraw(listener, time_ns) }
     }
 
-    fn redraw(&mut self, listener: &Listener, time_ns: u64) -> Result<(), LogError> {
+    fn redraw(&mut self, listener: &Listener, time_ns: u64) -> Result<(), RecordingError> {
         let map = listener.map();
         let robot = listener.replica().location().map(|location| location.vertex);
         if self.drawn.as_ref().is_some_and(|drawn| drawn.map == map && drawn.robot == robot) {

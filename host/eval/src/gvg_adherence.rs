@@ -10,7 +10,7 @@ use toposlam::ring::{Echo, RingFrame, RingGeometry};
 
 /// How many frames there are, and how many of them show the Voronoi graph.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Nearness {
+pub struct GvgAdherence {
     /// All frames.
     pub frames: usize,
     /// Those with a second obstacle about as near as the nearest.
@@ -21,24 +21,24 @@ pub struct Nearness {
     pub equidistance_mm: u16,
 }
 
-impl Nearness {
+impl GvgAdherence {
     /// Measures a recording with the place detector's notion of obstacles, but frame by frame, without its smoothing.
     pub fn of<const SONARS: usize>(
         frames: &[RingFrame<SONARS>],
         geometry: &RingGeometry<SONARS>,
         config: &PlaceConfig,
     ) -> Self {
-        let mut nearness = Self { frames: frames.len(), equidistance_mm: config.equidistance_mm, ..Self::default() };
+        let mut adherence = Self { frames: frames.len(), equidistance_mm: config.equidistance_mm, ..Self::default() };
         for frame in frames {
             let nearest_mm = nearest_mm(frame, geometry, config);
             let is_near = |number: usize| {
                 let range_mm = nearest_mm.get(number);
                 range_mm.is_some_and(|range_mm| range_mm - nearest_mm[0] <= config.equidistance_mm)
             };
-            nearness.on_graph += usize::from(is_near(1));
-            nearness.at_meet_point += usize::from(is_near(2));
+            adherence.on_graph += usize::from(is_near(1));
+            adherence.at_meet_point += usize::from(is_near(2));
         }
-        nearness
+        adherence
     }
 }
 
@@ -69,7 +69,7 @@ fn nearest_mm<const SONARS: usize>(
     nearest.into_iter().map(|(range_mm, _)| range_mm).collect()
 }
 
-impl fmt::Display for Nearness {
+impl fmt::Display for GvgAdherence {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let percent = |count: usize| 100.0 * count as f64 / self.frames.max(1) as f64;
         write!(
@@ -92,8 +92,8 @@ mod tests {
         let frame = |ranges_mm: [u16; 8]| RingFrame { echoes: ranges_mm.map(|range_mm| Echo::Range { range_mm }) };
         let measured = |ranges_mm| {
             let config = PlaceConfig::DEFAULT.with_separation_mrad(1047).with_equidistance_mm(150);
-            let nearness = Nearness::of(&[frame(ranges_mm)], &RingGeometry::even(), &config);
-            (nearness.on_graph, nearness.at_meet_point)
+            let adherence = GvgAdherence::of(&[frame(ranges_mm)], &RingGeometry::even(), &config);
+            (adherence.on_graph, adherence.at_meet_point)
         };
         assert_eq!(measured([500, 510, 900, 900, 900, 900, 900, 520]), (0, 0));
         assert_eq!(measured([500, 900, 900, 900, 650, 900, 900, 900]), (1, 0));
@@ -105,9 +105,9 @@ mod tests {
 
     #[test]
     fn the_text_gives_shares_of_all_frames() {
-        let nearness = Nearness { frames: 8, on_graph: 4, at_meet_point: 2, equidistance_mm: 150 };
-        let text = nearness.to_string();
+        let adherence = GvgAdherence { frames: 8, on_graph: 4, at_meet_point: 2, equidistance_mm: 150 };
+        let text = adherence.to_string();
         assert!(text.contains("150 mm") && text.contains("50 %") && text.contains("25 %"), "{text}");
-        assert!(!Nearness::default().to_string().contains("NaN"));
+        assert!(!GvgAdherence::default().to_string().contains("NaN"));
     }
 }

@@ -5,7 +5,6 @@ use std::io::Read;
 use anyhow::{Context, bail, ensure};
 use serde::Deserialize;
 use toposlam::ring::{Echo, RingFrame, RingGeometry};
-use toposlam::{FaultCounters, FaultKind};
 
 /// The largest ring that is replayed. The sensors of a smaller one fill the first places, the others are dead.
 pub const SONARS_MAX: usize = 32;
@@ -13,7 +12,7 @@ pub const SONARS_MAX: usize = 32;
 /// The description of a ring, as it stands in a TOML file.
 ///
 /// ```
-/// let ring = toposlam_eval::recording::Ring::parse(
+/// let ring = toposlam_eval::range_csv::Ring::parse(
 ///     r#"
 ///     sonars = 4
 ///     unit = "mm"
@@ -143,12 +142,6 @@ impl Ring {
             _ => Echo::Dead,
         }
     }
-}
-
-/// One line for each kind of fault that was seen.
-pub fn fault_lines(faults: &FaultCounters) -> Vec<String> {
-    let seen = FaultKind::ALL.into_iter().filter(|kind| faults.count(*kind) > 0);
-    seen.map(|kind| format!("{kind:?}: {}", faults.count(kind))).collect()
 }
 
 #[cfg(test)]

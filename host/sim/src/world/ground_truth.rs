@@ -38,7 +38,7 @@ pub struct Detection {
 }
 
 /// A log of a drive: what was visited and what was detected. Memory grows by some 40 bytes a frame.
-pub struct Journal {
+pub struct GroundTruth {
     map: TrueMap,
     truths: Vec<Truth>,
     visits: Vec<Visit>,
@@ -66,7 +66,7 @@ pub struct Report {
     pub nodes: Vec<(usize, usize)>,
 }
 
-impl Journal {
+impl GroundTruth {
     /// An empty log of a drive on a map.
     pub fn new(map: &TrueMap) -> Self {
         Self { map: map.clone(), truths: Vec::new(), visits: Vec::new(), detections: Vec::new() }

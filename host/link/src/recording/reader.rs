@@ -9,7 +9,7 @@ use mcap::sans_io::linear_reader::{LinearReadEvent, LinearReader, LinearReaderOp
 use mcap::{McapError, parse_record};
 use prost::Message;
 
-use super::{LogError, Topic};
+use super::{RecordingError, Topic};
 
 /// A record longer than this is damage: memory stays bounded.
 const RECORD_BYTES: usize = 1 << 24;
@@ -48,7 +48,7 @@ impl Recording<BufReader<File>> {
     ///
     /// # Errors
     /// When there is none or it may not be read.
-    pub fn open(path: &Path) -> Result<Self, LogError> {
+    pub fn open(path: &Path) -> Result<Self, RecordingError> {
         Ok(Self::new(BufReader::new(File::open(path)?)))
     }
 }
@@ -67,7 +67,7 @@ impl<FILE: Read> Recording<FILE> {
     }
 
     /// The next frame, or `None` at the end of the file.
-    fn advance(&mut self) -> Result<Option<TimedFrame>, LogError> {
+    fn advance(&mut self) -> Result<Option<TimedFrame>, RecordingError> {
         loop {
             match self.reader.next_event() {
                 None => return Ok(None),
@@ -80,7 +80,7 @@ impl<FILE: Read> Recording<FILE> {
                         self.channel = Some(channel.id);
                     }
                     Record::Message { header, data } if Some(header.channel_id) == self.channel => {
-                        let Ok(bytes) = Vec::<u8>::decode(&*data) else { return Err(LogError::NoFrames) };
+                        let Ok(bytes) = Vec::<u8>::decode(&*data) else { return Err(RecordingError::NoFrames) };
                         return Ok(Some(TimedFrame { time_ns: header.log_time, bytes }));
                     }
                     _ => {}
@@ -91,7 +91,7 @@ impl<FILE: Read> Recording<FILE> {
     }
 }
 
-fn read(file: &mut impl Read, buffer: &mut [u8]) -> Result<usize, LogError> {
+fn read(file: &mut impl Read, buffer: &mut [u8]) -> Result<usize, RecordingError> {
     loop {
         match file.read(buffer) {
             Err(error) if error.kind() == ErrorKind::Interrupted => {}
@@ -101,7 +101,7 @@ fn read(file: &mut impl Read, buffer: &mut [u8]) -> Result<usize, LogError> {
 }
 
 impl<FILE: Read> Iterator for Recording<FILE> {
-    type Item = Result<TimedFrame, LogError>;
+    type Item = Result<TimedFrame, RecordingError>;
 
     fn next(&mut self) -> Option<Self::Item> {
         if self.state != State::Reading {
@@ -113,13 +113,13 @@ impl<FILE: Read> Iterator for Recording<FILE> {
                 self.state = State::Whole;
                 None
             }
-            Err(LogError::Mcap(McapError::UnexpectedEof)) => {
+            Err(RecordingError::Mcap(McapError::UnexpectedEof)) => {
                 self.state = State::Cut;
                 None
             }
             failed => {
                 self.state = State::Failed;
-                Some(Err(failed.err().unwrap_or(LogError::NoFrames)))
+                Some(Err(failed.err().unwrap_or(RecordingError::NoFrames)))
             }
         }
     }

@@ -6,7 +6,7 @@ use mcap::McapError;
 
 /// Why a recording cannot be written or read.
 #[derive(Debug)]
-pub enum LogError {
+pub enum RecordingError {
     /// The file cannot be opened, written or read.
     File(io::Error),
     /// The file is not MCAP, or damaged.
@@ -15,13 +15,13 @@ pub enum LogError {
     NoFrames,
 }
 
-impl From<io::Error> for LogError {
+impl From<io::Error> for RecordingError {
     fn from(error: io::Error) -> Self {
         Self::File(error)
     }
 }
 
-impl From<McapError> for LogError {
+impl From<McapError> for RecordingError {
     fn from(error: McapError) -> Self {
         match error {
             McapError::Io(error) => Self::File(error),
@@ -30,17 +30,17 @@ impl From<McapError> for LogError {
     }
 }
 
-impl fmt::Display for LogError {
+impl fmt::Display for RecordingError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Self::File(_) => f.write_str("the file of the recording failed"),
-            Self::Mcap(_) => f.write_str("the recording is no MCAP file or damaged"),
+            Self::File(_) => f.write_str("cannot access the recording"),
+            Self::Mcap(_) => f.write_str("the recording is not an MCAP file, or is damaged"),
             Self::NoFrames => f.write_str("the MCAP file holds no frames of a toposlam robot"),
         }
     }
 }
 
-impl std::error::Error for LogError {
+impl std::error::Error for RecordingError {
     fn source(&self) -> Option<&(dyn std::error::Error + 'static)> {
         match self {
             Self::File(error) => Some(error),

@@ -174,20 +174,20 @@ fn damage_within_a_file_is_an_error_and_no_end() {
     let at = file.windows(frame.len()).position(|window| window == frame).unwrap();
     file[at] ^= 1;
     let last = Recording::new(&file[..]).last().unwrap();
-    assert!(matches!(last, Err(LogError::Mcap(mcap::McapError::BadChunkCrc { .. }))), "{last:?}");
+    assert!(matches!(last, Err(RecordingError::Mcap(mcap::McapError::BadChunkCrc { .. }))), "{last:?}");
 }
 
 #[test]
 fn a_file_of_something_else_is_refused() {
     let text = Recording::new(&b"not a recording, but a text"[..]).next().unwrap();
-    assert!(matches!(text, Err(LogError::Mcap(mcap::McapError::BadMagic))), "{text:?}");
+    assert!(matches!(text, Err(RecordingError::Mcap(mcap::McapError::BadMagic))), "{text:?}");
     let mut foreign = std::io::Cursor::new(Vec::new());
     let mut writer = mcap::Writer::new(&mut foreign).unwrap();
     writer.add_channel(0, "/elsewhere", "json", &BTreeMap::new()).unwrap();
     writer.finish().unwrap();
     drop(writer);
     let mut recording = Recording::new(&foreign.get_ref()[..]);
-    assert!(matches!(recording.next(), Some(Err(LogError::NoFrames))));
+    assert!(matches!(recording.next(), Some(Err(RecordingError::NoFrames))));
     assert!(recording.next().is_none());
 }
 

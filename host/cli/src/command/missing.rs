@@ -1,0 +1,30 @@
+//! Stand-ins for the commands that this build leaves out: each fails and names the feature that it needs.
+
+macro_rules! missing {
+    ($command:ident, $feature:literal) => {
+        pub(crate) mod $command {
+            /// Whatever follows the command.
+            #[derive(clap::Args)]
+            pub(crate) struct Arguments {
+                #[arg(trailing_var_arg = true, allow_hyphen_values = true, hide = true)]
+                rest: Vec<String>,
+            }
+
+            pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
+                let command = [&[stringify!($command).to_owned()], &arguments.rest[..]].concat().join(" ");
+                anyhow::bail!(
+                    "this build leaves out `{}`; run\n  cargo run --release --features {} -- {command}",
+                    stringify!($command),
+                    $feature,
+                )
+            }
+        }
+    };
+}
+
+#[cfg(not(feature = "recording"))]
+missing!(play, "recording");
+#[cfg(not(feature = "mqtt"))]
+missing!(publish, "mqtt");
+#[cfg(not(feature = "recording"))]
+missing!(record, "recording");

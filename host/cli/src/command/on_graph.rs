@@ -1,0 +1,60 @@
+//! `toposlam simulate --on-graph`: the robot follows the true Voronoi graph, which tests detector and filters without the drive.
+
+use clap::{Args, ValueEnum};
+use toposlam_cli::progress::Progress;
+use toposlam_eval::mapping::Mapping;
+use toposlam_sim::world::{GroundTruth, Simulation};
+
+use super::drive::{DriveArguments, Summary};
+use super::filter::FilterArgument;
+
+/// The options of a robot that follows the Voronoi graph.
+#[derive(Args)]
+pub(super) struct OnGraph {
+    /// Move the robot along the true Voronoi graph at random; its own drive is not used.
+    #[arg(long, alias = "on-rails")]
+    pub(super) on_graph: bool,
+    /// Filter that makes the map.
+    #[arg(long, value_enum, default_value_t = FilterArgument::Robust, requires = "on_graph")]
+    filter: FilterArgument,
+    /// Hints that the filter gets besides the ring frames.
+    #[arg(long, value_enum, default_value_t = Hints::Turn, requires = "on_graph")]
+    hints: Hints,
+}
+
+/// The hints that the filter gets besides the ring frames.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+enum Hints {
+    /// Nothing.
+    None,
+    /// Whether the robot turned back at the place before.
+    Turn,
+}
+
+pub(super) fn run(drive: &DriveArguments, options: &OnGraph, places: usize, frames: u64) -> anyhow::Result<()> {
+    let (plan, model) = drive.world()?;
+    let mut simulation = Simulation::new(&plan, model, drive.seed())?;
+    let mut ground_truth = GroundTruth::new(simulation.true_map());
+    let mut mapping = Mapping::reference(options.filter.into())?;
+    let progress = Progress::new("", places, "places");
+    let mut driven = 0;
+    while mapping.steps().len() < places && (frames == 0 || driven < frames) {
+        let Some((frame, truth)) = simulation.next() else { break };
+        driven += 1;
+        ground_truth.drive(&truth);
+        if let Some(step) = mapping.observe(&frame, truth.turn.filter(|_| options.hints == Hints::Turn)) {
+            ground_truth.detect(&step.place);
+            progress.println(step);
+            progress.increment();
+        }
+    }
+    drop(progress);
+    drive.summarise(&Summary {
+        plan: &plan,
+        truth: simulation.true_map(),
+        ground_truth: &ground_truth,
+        map: mapping.map(),
+        path: mapping.path(),
+        faults: mapping.faults(),
+    })
+}
