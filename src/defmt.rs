@@ -109,8 +109,8 @@ impl Format for Place {
 
 impl Format for Observation {
     fn format(&self, f: Formatter<'_>) {
-        let Self { fingerprint, turn, degree, begins } = self;
-        write!(f, "{}, turn {}, degree {}, begins a sequence: {=bool}", fingerprint, turn, degree, begins);
+        let Self { fingerprint, turn, degree, starts_sequence } = self;
+        write!(f, "{}, turn {}, degree {}, starts a sequence: {=bool}", fingerprint, turn, degree, starts_sequence);
     }
 }
 

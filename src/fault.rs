@@ -1,4 +1,4 @@
-//! Everything that can go wrong while the robot runs, by kind, and how often it did.
+//! Faults at run time: their kinds, and a counter for each.
 //!
 //! ```
 //! use toposlam::{FaultCounters, FaultKind};
@@ -10,47 +10,47 @@
 //! assert_eq!((ring.count(FaultKind::VerticesFull), ring.count(FaultKind::BusError)), (1, 0));
 //! ```
 
-/// A kind of fault. Faults are counted and reported; none of them ends the mapping or loses a map.
+/// A kind of fault. Faults are counted and reported; none of them stops the mapping or discards a map.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 #[repr(u8)]
 #[non_exhaustive]
 pub enum FaultKind {
-    /// A sonar did not answer in time.
+    /// A sonar did not answer before its timeout.
     SonarSilent = 0,
-    /// A sonar answered with a value outside what its data sheet allows.
+    /// A sonar returned a range outside the limits of its data sheet.
     SonarOutOfRange = 1,
-    /// The sensor bus reported an error in the middle of a frame.
+    /// The sensor bus, a pin or the clock of the sonars failed.
     BusError = 2,
-    /// A ring frame had too few live sensors to look for a place.
+    /// A ring frame had too few live sensors to detect a place.
     RingBlind = 3,
-    /// A place had a radius that no fingerprint holds.
+    /// The radius of a place is above the largest fingerprint.
     RadiusOutOfRange = 4,
-    /// A new vertex was wanted and the vertex table is full.
+    /// A place needed a new vertex and the map is full.
     VerticesFull = 5,
-    /// A new n-gram was wanted and the n-gram table is full.
+    /// A new n-gram was not stored because the n-gram table is full.
     NgramsFull = 6,
-    /// The history ring is full: the oldest observation was dropped for the newest.
+    /// The history is full: the oldest place was dropped.
     HistoryFull = 7,
-    /// The transmit queue was full: a message was dropped (the rolling picture makes up for it).
+    /// The transmit queue was full: a message was dropped. The repeated map makes up for it.
     WireFull = 8,
     /// A frame on the serial line was corrupt, cut or foreign.
     WireCorrupt = 9,
-    /// The flash could not be written or erased: a snapshot was not kept.
+    /// The flash could not be written or erased: a snapshot was not stored.
     StoreFailed = 10,
-    /// A snapshot could not be restored: it was corrupt, of another version, or contradicts itself.
+    /// A snapshot was not restored: it is corrupt, of another version, or inconsistent.
     SnapshotRejected = 11,
-    /// A request was understood and refused.
+    /// A request was valid and refused.
     CommandRefused = 12,
-    /// Requests came faster than the loop takes them: one was dropped.
+    /// A request was dropped because requests arrived faster than the main loop executes them.
     CommandFlood = 13,
-    /// The drive lost its way along the Voronoi graph and looked for it anew.
+    /// The drive lost the Voronoi graph and searched for it again.
     DriveLost = 14,
-    /// A turn of the main loop took longer than its bound.
+    /// A step of the main loop took longer than its limit.
     LoopLate = 15,
 }
 
 impl FaultKind {
-    /// Every kind, in the order of its number.
+    /// All kinds, in the order of their numbers.
     pub const ALL: [Self; 16] = [
         Self::SonarSilent,
         Self::SonarOutOfRange,
@@ -71,14 +71,14 @@ impl FaultKind {
     ];
 }
 
-/// How often each kind of fault was seen since the start; every count saturates.
+/// A saturating counter for each kind of fault.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct FaultCounters {
     counts: [u32; FaultKind::ALL.len()],
 }
 
 impl FaultCounters {
-    /// All counts at zero.
+    /// Creates the counters, all zero.
     pub const fn new() -> Self {
         Self { counts: [0; FaultKind::ALL.len()] }
     }
@@ -95,7 +95,7 @@ impl FaultCounters {
         self.counts.get(kind as usize).copied().unwrap_or(0)
     }
 
-    /// Adds the counts of another stage.
+    /// Adds the counts of another stage, saturating.
     pub fn add(&mut self, other: &Self) {
         for (count, more) in self.counts.iter_mut().zip(other.counts) {
             *count = count.saturating_add(more);

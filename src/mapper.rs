@@ -104,9 +104,9 @@ impl<const SONARS: usize, const V: usize, F: Filter<V>> Mapper<SONARS, V, F> {
     pub fn observe(&mut self, frame: &RingFrame<SONARS>, turn: Option<Turn>) -> Option<(Place, Update)> {
         if let Some(place) = self.detector.observe(frame) {
             let Place { fingerprint, degree, .. } = place;
-            let begins = core::mem::take(&mut self.starts_sequence);
+            let starts_sequence = core::mem::take(&mut self.starts_sequence);
             self.refinement_steps = 0;
-            return Some((place, self.filter.observe(Observation { fingerprint, turn, degree, begins })));
+            return Some((place, self.filter.observe(Observation { fingerprint, turn, degree, starts_sequence })));
         }
         let most = if self.filter.is_in_doubt() { REFINEMENT_STEPS_IN_DOUBT } else { REFINEMENT_STEPS };
         if self.refinement_steps < most {

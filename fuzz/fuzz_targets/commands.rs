@@ -1,17 +1,20 @@
 //! Any bytes and any requests to a robot, whose main loop turns at any moment between them.
 #![no_main]
 
+#[path = "commands/expected.rs"]
+mod expected;
+
 use std::sync::LazyLock;
 
 use arbitrary::Arbitrary;
+use expected::{Expected, Staged};
 use libfuzzer_sys::fuzz_target;
 use toposlam::persist::Persist;
 use toposlam::persist::snapshot::Writer;
 use toposlam::place::PlaceDetector;
 use toposlam::reference::{PLACE, RING, SONARS};
 use toposlam::wire::{
-    Chunk, Command, Decoder, Inbox, Info, Outcome, Progress, Refusal, Request, ResetCause, Setting, Settings, Staging,
-    Version, crc32,
+    Chunk, Command, Inbox, Info, Outcome, Refusal, Request, ResetCause, Setting, Settings, Staging, Version, crc32,
 };
 use toposlam::{FaultKind, RobustFilter};
 use toposlam_fuzz::filters::{self, CONFIG, HYPOTHESES, Small};
@@ -278,7 +281,7 @@ impl<'buffer> Robot<'buffer> {
             taken?;
             self.expected.staged = Staged::Outgoing;
         }
-        let piece = self.staging.piece(offset);
+        let piece = self.staging.outgoing_chunk(offset);
         match (&piece, &self.expected.staged) {
             (Ok(Outcome::Snapshot { total, offset: at, bytes }), Staged::Outgoing) => {
                 let rest = usize::from(total - offset);
@@ -334,106 +337,6 @@ impl<'buffer> Robot<'buffer> {
             goal: self.goal,
             stored_bytes: 0,
             stored_places_ago: 0,
-        }
-    }
-}
-
-/// What an inbox and a staging buffer that keep their promises do.
-#[derive(Default)]
-struct Expected {
-    decoder: Decoder<Request>,
-    answered: Option<(Request, Outcome)>,
-    staged: Staged,
-    corrupt: u32,
-    flood: u32,
-    refused: u32,
-}
-
-impl Expected {
-    /// The request that is due after the bytes of one turn.
-    fn receive(&mut self, bytes: &[u8]) -> Option<Request> {
-        let most = usize::from(Inbox::BYTES_PER_TURN);
-        self.flood += u32::from(bytes.len() > most);
-        let mut rest = &bytes[..bytes.len().min(most)];
-        let mut due = None;
-        loop {
-            match self.decoder.feed(rest) {
-                Progress::NeedsMore => return due,
-                Progress::Error { rest: behind, .. } => {
-                    self.corrupt += 1;
-                    rest = behind;
-                }
-                Progress::Message { message, rest: behind, .. } => {
-                    self.flood += u32::from(*due.get_or_insert(message) != message);
-                    rest = behind;
-                }
-            }
-        }
-    }
-
-    /// One request at most is executed, unless it is the last one again; its reply is what came of it.
-    fn judge(&mut self, due: Option<Request>, executed: Option<(Command, Outcome)>, reply: Option<(u16, Outcome)>) {
-        assert_eq!(reply.map(|(id, _)| id), due.map(|request| request.id));
-        let (Some(request), Some((_, outcome))) = (due, reply) else {
-            assert_eq!(executed, None);
-            return;
-        };
-        match (self.answered, executed) {
-            (Some(answered), None) => assert_eq!((request, outcome), answered, "the same request gets the same reply"),
-            (answered, executed) => {
-                assert_eq!(executed, Some((request.command, outcome)));
-                assert!(answered.is_none_or(|(last, _)| last != request), "{request:?} was executed twice");
-                self.refused += u32::from(matches!(outcome, Outcome::Refused(_)));
-                self.answered = Some((request, outcome));
-            }
-        }
-    }
-}
-
-/// What a staging buffer holds.
-#[derive(Debug, Default)]
-enum Staged {
-    #[default]
-    Nothing,
-    Outgoing,
-    Incoming {
-        length: u16,
-        crc: u32,
-        received: Vec<u8>,
-    },
-}
-
-impl Staged {
-    fn begin(&mut self, length: u16, crc: u32) -> Result<(), Refusal> {
-        if usize::from(length) > STAGING_BYTES {
-            return Err(Refusal::TooLong);
-        }
-        *self = Self::Incoming { length, crc, received: Vec::new() };
-        Ok(())
-    }
-
-    fn chunk(&mut self, offset: u16, bytes: &[u8]) -> Result<(), Refusal> {
-        let Self::Incoming { length, received, .. } = self else { return Err(Refusal::NotNow) };
-        let (offset, end) = (usize::from(offset), usize::from(offset) + bytes.len());
-        if offset > received.len() {
-            return Err(Refusal::MissingChunk);
-        }
-        if end > usize::from(*length) {
-            return Err(Refusal::OutOfRange);
-        }
-        received.resize(received.len().max(end), 0);
-        received[offset..end].copy_from_slice(bytes);
-        Ok(())
-    }
-
-    fn commit(&self) -> Result<&[u8], Refusal> {
-        match self {
-            Self::Incoming { length, received, .. } if received.len() < usize::from(*length) => {
-                Err(Refusal::MissingChunk)
-            }
-            Self::Incoming { crc, received, .. } if crc32(received) == *crc => Ok(received),
-            Self::Incoming { .. } => Err(Refusal::BadCrc),
-            _ => Err(Refusal::NotNow),
         }
     }
 }

@@ -38,7 +38,7 @@ impl Seen {
                 _ => None,
             },
             degree: (self.hints & 4 != 0).then_some(self.hints >> 4),
-            begins: self.hints & 0xF8 == 0xF8,
+            starts_sequence: self.hints & 0xF8 == 0xF8,
         }
     }
 }
@@ -50,7 +50,7 @@ pub fn walk(index: usize) -> Observation {
     Observation {
         turn: [None, Some(Turn::On), Some(Turn::Back)][index % 3],
         degree: index.is_multiple_of(4).then_some(1 + room as u8 / 2),
-        begins: index == 17,
+        starts_sequence: index == 17,
         ..Observation::new(Fingerprint::from_steps(steps).unwrap())
     }
 }

@@ -1,4 +1,4 @@
-//! Robots whose sonars fail explore the simulated world: what they touch, what they find, and what they know of their turns.
+//! Exploration of the simulated world with faulty sonars: collisions, places found, and turn hints.
 
 use toposlam::Turn;
 use toposlam::reference::SNAPSHOT_BYTES;
@@ -6,18 +6,18 @@ use toposlam_eval::mapping::score_exploration;
 use toposlam_sim::exploration::Exploration;
 use toposlam_sim::world::{Plan, Report, RobotModel, SonarModel};
 
-/// How an exploration went.
+/// The result of an exploration.
 struct Outcome {
     report: Report,
     /// Frames in which the robot touched a wall.
     touched: u32,
-    /// Places of which the drive told rightly, wrongly, how the robot left them.
+    /// Number of right and of wrong turn hints.
     turns: (usize, usize),
-    /// The share of the places that the robot knows its map's vertex of.
+    /// Share of the places that the final map assigns to the right vertex.
     located: f64,
 }
 
-/// Explores until so many places are found.
+/// Explores until `places` places are found.
 fn explore(plan: &str, sonar: SonarModel, seed: u64, places: usize) -> Outcome {
     let plan = Plan::built_in(plan).unwrap();
     let mut buffer = [0; SNAPSHOT_BYTES];
@@ -38,7 +38,7 @@ fn explore(plan: &str, sonar: SonarModel, seed: u64, places: usize) -> Outcome {
 }
 
 #[test]
-fn a_robot_whose_sonar_ahead_is_dead_touches_no_wall_and_finds_its_places() {
+fn with_the_sonar_ahead_dead_the_robot_touches_no_wall_and_finds_its_places() {
     for (plan, seed) in [("ring", 0), ("office", 1)] {
         let sonar = SonarModel { dead_sonars: 1, ..SonarModel::default() };
         let Outcome { report, touched, located, .. } = explore(plan, sonar, seed, 100);
@@ -49,7 +49,7 @@ fn a_robot_whose_sonar_ahead_is_dead_touches_no_wall_and_finds_its_places() {
 }
 
 #[test]
-fn a_robot_whose_sonar_at_the_side_is_dead_takes_no_corridor_for_a_place() {
+fn with_a_sonar_at_the_side_dead_no_corridor_is_a_place() {
     let sonar = SonarModel { dead_sonars: 1 << 4, ..SonarModel::default() };
     let Outcome { report, turns: (right, wrong), .. } = explore("ring", sonar, 0, 100);
     assert!(report.phantom + report.doubled <= 1, "{report}");
@@ -57,7 +57,7 @@ fn a_robot_whose_sonar_at_the_side_is_dead_takes_no_corridor_for_a_place() {
 }
 
 #[test]
-fn a_robot_that_misses_a_tenth_of_the_echoes_knows_how_it_left_its_places() {
+fn with_a_tenth_of_the_echoes_missed_the_turn_hints_are_right() {
     let sonar = SonarModel { missed_share: 0.1, ..SonarModel::default() };
     let Outcome { report, turns: (right, wrong), located, .. } = explore("office", sonar, 0, 100);
     assert!(right > 80 && wrong <= 3, "{right} right, {wrong} wrong");
@@ -66,7 +66,7 @@ fn a_robot_that_misses_a_tenth_of_the_echoes_knows_how_it_left_its_places() {
 }
 
 #[test]
-fn walls_that_are_heard_from_along_them_make_no_places() {
+fn walls_detected_at_a_flat_angle_are_not_places() {
     let sonar = SonarModel { specular_limit_rad: 35_f64.to_radians(), ..SonarModel::default() };
     let Outcome { report, .. } = explore("office", sonar, 0, 100);
     assert!(report.phantom + report.doubled <= 1, "{report}");

@@ -31,7 +31,7 @@ fn the_filter_hears_of_radius_degree_and_turn() {
                 fingerprint: place.fingerprint,
                 turn: truth.turn,
                 degree: place.degree,
-                begins: false,
+                starts_sequence: false,
             });
         }
         if expected.len() == 12 {

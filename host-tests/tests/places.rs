@@ -1,4 +1,4 @@
-//! The place detector in the simulated world and on a real recording: what it finds, misses and doubles.
+//! The place detector in the simulated world and on a real recording: places found, missed, doubled and phantom.
 
 use std::fs::File;
 use std::io::Write;
@@ -12,7 +12,7 @@ use toposlam::{FaultKind, Turn};
 use toposlam_eval::range_csv::Ring;
 use toposlam_sim::world::{GroundTruth, Plan, Report, RobotModel, SONARS, Simulation, SonarModel};
 
-/// Drives until so many nodes were visited.
+/// Drives until `visits` nodes were visited.
 fn drive(plan: &str, model: RobotModel, seed: u64, visits: usize) -> (Report, Vec<Place>) {
     let plan = Plan::built_in(plan).unwrap();
     let mut simulation = Simulation::new(&plan, model, seed).unwrap();
@@ -30,8 +30,8 @@ fn drive(plan: &str, model: RobotModel, seed: u64, visits: usize) -> (Report, Ve
     (ground_truth.report(), ground_truth.detections().iter().map(|detection| detection.place).collect())
 }
 
-/// At default noise every visit gives its place once; at twice that at least nine in ten do.
-fn places_are_found_once(plan: &str) {
+/// At the default noise every visit is detected exactly once; at twice the noise at most three of 40 are wrong.
+fn check_places_are_found_once(plan: &str) {
     let (report, _) = drive(plan, RobotModel::default(), 5, 80);
     assert_eq!((report.found, report.missed, report.doubled, report.phantom), (79, 0, 0, 0), "{report}");
     assert!(report.radius_error_p90_mm() < 20.0, "{report}");
@@ -42,21 +42,21 @@ fn places_are_found_once(plan: &str) {
 
 #[test]
 fn places_of_the_ring_corridor_are_found_once() {
-    places_are_found_once("ring");
+    check_places_are_found_once("ring");
 }
 
 #[test]
 fn places_of_the_office_floor_are_found_once() {
-    places_are_found_once("office");
+    check_places_are_found_once("office");
 }
 
 #[test]
 fn places_of_the_flat_are_found_once() {
-    places_are_found_once("flat");
+    check_places_are_found_once("flat");
 }
 
 #[test]
-fn the_drive_tells_rightly_whether_the_robot_turned_back_at_the_place_before() {
+fn the_turn_hint_of_the_drive_is_right_at_every_place() {
     let plan = Plan::built_in("office").unwrap();
     let mut simulation = Simulation::new(&plan, RobotModel::default(), 7).unwrap();
     let mut ground_truth = GroundTruth::new(simulation.true_map());
@@ -80,7 +80,7 @@ fn the_drive_tells_rightly_whether_the_robot_turned_back_at_the_place_before() {
 }
 
 #[test]
-fn a_seed_gives_the_same_places_again_and_another_seed_gives_others() {
+fn places_depend_on_the_seed_only() {
     let noisy = RobotModel::default().with_noise(2.0);
     let (report, places) = drive("flat", noisy, 8, 15);
     assert_eq!((report, places.clone()), drive("flat", noisy, 8, 15));
@@ -88,7 +88,7 @@ fn a_seed_gives_the_same_places_again_and_another_seed_gives_others() {
 }
 
 #[test]
-fn a_robot_with_one_dead_sonar_still_finds_most_places() {
+fn with_one_dead_sonar_most_places_are_found() {
     for dead in [0, 4, 7] {
         let sonar = SonarModel { dead_sonars: 1 << dead, ..SonarModel::default() };
         let (report, _) = drive("office", RobotModel { sonar, ..RobotModel::default() }, 10, 30);
@@ -97,7 +97,7 @@ fn a_robot_with_one_dead_sonar_still_finds_most_places() {
 }
 
 #[test]
-fn the_office_floor_has_eleven_places_of_which_some_look_alike() {
+fn the_office_floor_has_eleven_places_and_some_have_equal_radii() {
     let simulation = Simulation::new(&Plan::built_in("office").unwrap(), RobotModel::default(), 1).unwrap();
     let map = simulation.true_map();
     assert_eq!((map.nodes.len(), map.edges.len()), (11, 13));
@@ -106,10 +106,10 @@ fn the_office_floor_has_eleven_places_of_which_some_look_alike() {
 }
 
 #[test]
-fn the_real_recording_gives_places_whose_radius_fits_its_room() {
+fn the_places_of_the_real_recording_have_radii_that_fit_the_room() {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../shared/data/scitos-g5/sensor_readings_24.data");
     let Ok(recording) = File::open(&path) else {
-        // Written past the capture of test output, so that it is seen.
+        // Written directly to stderr, because the harness captures the output of a passing test.
         let _ = writeln!(std::io::stderr(), "SKIPPED: no recording at ../shared/data/scitos-g5");
         return;
     };
@@ -133,7 +133,7 @@ fn any_echo() -> impl Strategy<Value = Echo> {
 
 proptest! {
     #[test]
-    fn any_frames_and_settings_give_places_within_the_range_and_no_panic(
+    fn any_frames_and_settings_give_valid_places_without_a_panic(
         frames in prop::collection::vec(prop::array::uniform16(any_echo()), 1..60),
         (equidistance_mm, more_mm) in (1u16..3000, 0u16..3000),
         separation_mrad in 1u16..=2094,

@@ -43,7 +43,7 @@ fn drive(random: &mut Random, building: &Graph, places: usize, noise_steps: usiz
         let noise = random.below(2 * noise_steps + 1) as f64 - noise_steps as f64;
         let steps = building.label(place) / 2.0 + noise;
         let fingerprint = Fingerprint::from_steps(steps as u16).expect("labels of tests are in range");
-        Observation { fingerprint, turn, degree, begins }
+        Observation { fingerprint, turn, degree, starts_sequence: begins }
     };
     (0..places).map(&mut observe).collect()
 }

@@ -64,16 +64,16 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_configuration_names_the_field_that_cannot_be() {
+    fn each_field_out_of_its_range_is_named() {
         let good = DriveConfig::DEFAULT;
         assert_eq!(good.check(), Ok(()));
-        let wrong = [
+        let bad = [
             (DriveConfig { speed_permille: 0, ..good }, "speed_permille"),
             (DriveConfig { speed_permille: 1001, ..good }, "speed_permille"),
             (DriveConfig { look_ahead_mm: 0, ..good }, "look_ahead_mm"),
             (DriveConfig { timeout_frames: 0, ..good }, "timeout_frames"),
         ];
-        for (config, field) in wrong {
+        for (config, field) in bad {
             assert_eq!(config.check().unwrap_err().field(), field);
         }
     }

@@ -1,4 +1,4 @@
-//! Two driven wheels: a velocity becomes wheel speeds, and wheel speeds become PWM duty and direction.
+//! Differential drive: velocity command to wheel speeds, wheel speeds to PWM duty cycle and direction.
 
 use crate::setters::setters;
 use core::fmt;
@@ -8,17 +8,18 @@ use embedded_hal::{digital::OutputPin, pwm::SetDutyCycle};
 use super::VelocityCommand;
 use crate::ConfigError;
 
-/// How a robot with two driven wheels turns a velocity into wheel speeds.
+/// Settings of a robot with two driven wheels.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub struct WheelsConfig {
-    /// Beyond this heading the robot turns on the spot, in milliradians, 1 to 3142. Default 600.
+    /// Heading above which the robot turns in place, in milliradians, 1 to 3142. Default 600.
     pub spin_from_mrad: i16,
-    /// Speed of each wheel while it turns on the spot, in thousandths, 1 to 1000. Default 500.
+    /// Maximum speed of each wheel while the robot turns in place, in thousandths of full speed, 1 to 1000. Default 500.
     pub spin_permille: u16,
-    /// By how much each wheel is faster or slower for a heading of one radian, in thousandths, 1 to 2000. Default 800.
+    /// Steering gain: the speed added to one wheel and subtracted from the other per radian of heading, in thousandths of full
+    /// speed, 1 to 2000. Default 800.
     pub steer_permille_per_rad: u16,
-    /// The least duty at which the motors move at all, in thousandths, below 1000. Default 0.
+    /// Minimum duty cycle at which the motors turn, in thousandths, below 1000. Default 0.
     pub dead_zone_permille: u16,
 }
 
@@ -62,24 +63,24 @@ pub struct WheelSpeeds {
 }
 
 impl WheelSpeeds {
-    /// The wheel speeds that follow a velocity.
+    /// Computes the wheel speeds for a velocity command. Neither exceeds ±1000.
     pub fn from_velocity(velocity: VelocityCommand, config: &WheelsConfig) -> Self {
         let heading_mrad = i32::from(velocity.heading_mrad);
-        let is_on_the_spot = velocity.speed_permille == 0 || heading_mrad.abs() > i32::from(config.spin_from_mrad);
+        let is_in_place = velocity.speed_permille == 0 || heading_mrad.abs() > i32::from(config.spin_from_mrad);
         let steer = heading_mrad * i32::from(config.steer_permille_per_rad) / 1000;
-        let (forward, aside) = if is_on_the_spot {
+        let (forward, aside) = if is_in_place {
             let spin = i32::from(config.spin_permille);
             (0, steer.clamp(-spin, spin))
         } else {
             let aside = steer.clamp(-1000, 1000);
-            // The faster wheel goes no faster than it can.
+            // Slows down so that the faster wheel is at most at full speed.
             (i32::from(velocity.speed_permille).min(1000 - aside.abs()), aside)
         };
         Self { left_permille: (forward - aside) as i16, right_permille: (forward + aside) as i16 }
     }
 }
 
-/// Two motors, each with a PWM channel for its speed and a pin for its direction: high is forward.
+/// Two motors, each with a PWM channel for its speed and a pin for its direction (high is forward).
 #[derive(Debug)]
 pub struct DifferentialDrive<PWM, DIRECTION> {
     left: (PWM, DIRECTION),
@@ -88,19 +89,19 @@ pub struct DifferentialDrive<PWM, DIRECTION> {
 }
 
 impl<PWM: SetDutyCycle, DIRECTION: OutputPin> DifferentialDrive<PWM, DIRECTION> {
-    /// The two motors. Nothing moves before the first velocity.
+    /// Creates the drive. The motors do not move before the first command.
     ///
     /// # Errors
-    /// Names the field of the configuration that cannot be.
+    /// The first setting that is out of its range.
     pub fn new(left: (PWM, DIRECTION), right: (PWM, DIRECTION), config: WheelsConfig) -> Result<Self, ConfigError> {
         config.check()?;
         Ok(Self { left, right, config })
     }
 
-    /// Sets both motors to follow a velocity.
+    /// Sets both motors to a velocity command.
     ///
     /// # Errors
-    /// [`MotorError`] names the wheel that did not take its setting; the other one is set all the same.
+    /// [`MotorError`] with the wheel whose PWM channel or pin failed; the other one is set all the same.
     pub fn follow(&mut self, velocity: VelocityCommand) -> Result<(), MotorError> {
         let WheelSpeeds { left_permille, right_permille } = WheelSpeeds::from_velocity(velocity, &self.config);
         let dead_zone_permille = self.config.dead_zone_permille;
@@ -117,7 +118,7 @@ impl<PWM: SetDutyCycle, DIRECTION: OutputPin> DifferentialDrive<PWM, DIRECTION> 
         self.follow(VelocityCommand::STOP)
     }
 
-    /// Gives the motors back.
+    /// Returns the motors, left and right.
     pub fn release(self) -> [(PWM, DIRECTION); 2] {
         [self.left, self.right]
     }
@@ -148,15 +149,15 @@ pub enum Wheel {
     Right,
 }
 
-/// The motor of a wheel did not take its setting.
+/// The PWM channel or the direction pin of a wheel failed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct MotorError(pub Wheel);
 
 impl fmt::Display for MotorError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(match self.0 {
-            Wheel::Left => "the left motor did not take its setting",
-            Wheel::Right => "the right motor did not take its setting",
+            Wheel::Left => "the left motor cannot be set",
+            Wheel::Right => "the right motor cannot be set",
         })
     }
 }
@@ -175,7 +176,7 @@ mod tests {
     }
 
     #[test]
-    fn ahead_is_both_wheels_alike_and_aside_is_an_arc_within_what_the_wheels_can() {
+    fn straight_ahead_both_wheels_are_equal_and_aside_the_robot_drives_an_arc_within_full_speed() {
         assert_eq!(speeds(0, 1000), (1000, 1000));
         assert_eq!(speeds(0, 300), (300, 300));
         assert_eq!(speeds(250, 500), (300, 700));
@@ -183,7 +184,7 @@ mod tests {
     }
 
     #[test]
-    fn far_aside_or_without_speed_the_robot_turns_on_the_spot() {
+    fn far_aside_or_without_speed_the_robot_turns_in_place() {
         assert_eq!(speeds(2000, 1000), (-500, 500));
         assert_eq!(speeds(-2000, 0), (500, -500));
         assert_eq!(speeds(100, 0), (-80, 80));
@@ -191,7 +192,7 @@ mod tests {
     }
 
     #[test]
-    fn every_command_gives_speeds_that_the_wheels_can() {
+    fn no_command_exceeds_full_speed() {
         for heading_mrad in (i16::MIN..=i16::MAX).step_by(97) {
             for speed_permille in [0, 1, 500, 1000, u16::MAX] {
                 let (left, right) = speeds(heading_mrad, speed_permille);

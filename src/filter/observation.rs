@@ -21,7 +21,7 @@ pub enum Turn {
 /// // A dead end, to which the robot did not turn back. A detector or a drive that does not know says `None`.
 /// let radius = Fingerprint::from_radius_mm(640)?;
 /// let observation = Observation { turn: Some(Turn::On), degree: Some(1), ..Observation::new(radius) };
-/// assert!(!observation.begins);
+/// assert!(!observation.starts_sequence);
 /// # Ok::<(), toposlam::FingerprintError>(())
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -33,15 +33,15 @@ pub struct Observation {
     /// How many ways lead away from the place, 1 to 7, if the detector could count them; larger numbers count as 7, and
     /// 0 as unknown.
     pub degree: Option<u8>,
-    /// Whether the robot did not drive here from the place before: it was carried off, or this is the first place of an
-    /// n-gram of an earlier exploration. The first place of all begins a sequence whatever stands here.
-    pub begins: bool,
+    /// Whether the place need not be a neighbour of the previous one: the robot was kidnapped, or this is the first place of an
+    /// n-gram of an earlier exploration. The first place of all always starts a sequence.
+    pub starts_sequence: bool,
 }
 
 impl Observation {
     /// A place of which only the radius is known, next to the place before.
     pub const fn new(fingerprint: Fingerprint) -> Self {
-        Self { fingerprint, turn: None, degree: None, begins: false }
+        Self { fingerprint, turn: None, degree: None, starts_sequence: false }
     }
 }
 

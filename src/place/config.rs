@@ -1,40 +1,39 @@
-//! The place detector's settings: documented defaults, checked once.
+//! Settings of the place detector, checked once at the start.
 
 use crate::ConfigError;
 use crate::ring::RingGeometry;
 use crate::setters::setters;
 
-/// When a ring frame shows a meet point, and when the robot has left it.
+/// Settings of the place detector: when a frame shows a meet point, and when the robot has left it.
 ///
-/// The defaults suit a ring of 16 or 24 sonars on a robot that drives some 30 mm between two frames.
+/// The defaults are for a ring of 16 or 24 sonars on a robot that drives some 30 mm between two frames.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub struct PlaceConfig {
-    /// Obstacles whose ranges differ by no more than this are equidistant, in millimetres. Default 150.
+    /// Largest difference of range between equidistant obstacles, in millimetres, at least 1. Default 150.
     ///
-    /// It must cover the range noise (the spread of three readings is about twice their standard deviation) and a
-    /// few frames of travel and of straying from the middle, which counts twice.
+    /// It must exceed the range noise (the spread of three ranges is about twice their standard deviation) plus the travel of
+    /// a few frames plus twice the deviation from the edge.
     pub equidistance_mm: u16,
-    /// The meet point has been left when the third obstacle is this much farther than the nearest, in millimetres.
-    /// Default 300. At least `equidistance_mm`.
+    /// Spread above which the robot has left the meet point, in millimetres, at least `equidistance_mm`. Default 300.
     pub leave_mm: u16,
-    /// Two echoes less than this apart in bearing are the same obstacle, in milliradians, 1 to 2094. Default 1047 (60°).
+    /// Minimum angle between two obstacles, in milliradians, 1 to 2094. Default 1047 (60°). Echoes closer in bearing are one
+    /// obstacle.
     ///
-    /// It must exceed the beam width plus one spacing of the sensors, and it bounds how close in bearing two corners
-    /// of a junction may lie.
+    /// It must exceed the beam width plus the spacing of the sensors. Two corners of a junction must be farther apart.
     pub separation_mrad: u16,
-    /// How many frames must show the meet point before it counts, 1 to 255. Default 3.
+    /// Number of frames that confirm a meet point, 1 to 255. Default 3.
     pub confirm_frames: u8,
-    /// How many frames more with than without must show that the meet point is over, 1 to 255. Default 3.
+    /// Number of frames without the meet point, minus frames with it, after which it is over, 1 to 255. Default 3.
     pub leave_frames: u8,
-    /// A robot that stands still gets its place after this many frames at the latest, 1 to 255 and at least
-    /// `confirm_frames`. Default 25.
+    /// Number of frames after which a place is reported although the robot is still at it, `confirm_frames` to 255.
+    /// Default 25.
     pub settle_frames: u8,
-    /// Ranges below this are nonsense, in millimetres, at least 1. Default 30 (SRF08 data sheet: 3 cm).
+    /// Minimum valid range, in millimetres, at least 1. Default 30 (SRF08 data sheet: 3 cm). A shorter one is a fault.
     pub range_min_mm: u16,
-    /// Ranges above this count as silence, in millimetres. Default 6000 (SRF08 data sheet: 6 m).
+    /// Maximum valid range, in millimetres, above `range_min_mm`. Default 6000 (SRF08 data sheet: 6 m). A longer one is silence.
     pub range_max_mm: u16,
-    /// A frame with fewer live sensors is blind, 3 to the size of the ring. Default 6.
+    /// Minimum number of live sensors, 3 to the size of the ring. Default 6. A frame with fewer is blind.
     pub live_sensors_min: u8,
 }
 
@@ -96,7 +95,7 @@ impl PlaceConfig {
         }
     }
 
-    /// What a detector holds before it is started: all zero.
+    /// The settings of a detector before its start: all zero.
     pub(crate) const UNSET: Self = Self {
         equidistance_mm: 0,
         leave_mm: 0,

@@ -1,24 +1,24 @@
-//! The fingerprint of a place: the radius of the largest obstacle-free disc around a meet point, quantised.
+//! The fingerprint of a place: the quantised radius of the largest obstacle-free disc around a meet point (Eq. 1).
 
 use core::fmt;
 
-/// A quantised radius in steps of 2 mm: 0 to 8.188 m in 12 bits, so that five of them fit one `u64`.
+/// The radius of a place in steps of 2 mm: 0 to 8.188 m in 12 bits, so that five of them fit into a `u64`.
 ///
-/// It is the label `l` of the paper (Eq. 1). Distances between fingerprints are integers in the same step.
+/// It is the label `l` of Eq. 1. Distances between fingerprints are integers in the same unit.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct Fingerprint(u16);
 
 impl Fingerprint {
-    /// The width of one step, in millimetres.
+    /// Width of one step, in millimetres.
     pub const STEP_MM: u16 = 2;
-    /// How many bits a fingerprint needs.
+    /// Number of bits of a fingerprint.
     pub const BITS: u32 = 12;
-    /// The smallest fingerprint: no room at all.
+    /// The smallest fingerprint: a radius of 0.
     pub const ZERO: Self = Self(0);
     /// The largest fingerprint: 4094 steps, 8188 mm.
     pub const MAX: Self = Self(4094);
 
-    /// The fingerprint nearest to a radius in millimetres (halves round up).
+    /// Quantises a radius in millimetres, rounded to the nearest step, halves up.
     ///
     /// # Errors
     /// [`FingerprintError::TooLarge`] above 8188 mm.
@@ -36,34 +36,34 @@ impl Fingerprint {
         Ok(Self(radius_mm.div_ceil(Self::STEP_MM)))
     }
 
-    /// A fingerprint from its number of steps; `None` above 4094.
+    /// Creates a fingerprint from a number of steps; `None` above 4094.
     pub const fn from_steps(steps: u16) -> Option<Self> {
         if steps > Self::MAX.0 { None } else { Some(Self(steps)) }
     }
 
-    /// The radius in steps of 2 mm, 0 to 4094.
+    /// Radius in steps of 2 mm, 0 to 4094.
     pub const fn steps(self) -> u16 {
         self.0
     }
 
-    /// The radius in millimetres, 0 to 8188.
+    /// Radius in millimetres, 0 to 8188.
     pub const fn radius_mm(self) -> u16 {
         self.0 * Self::STEP_MM
     }
 
-    /// The absolute difference in steps.
+    /// Absolute difference of two radii, in steps of 2 mm.
     pub const fn distance_steps(self, other: Self) -> u16 {
         self.0.abs_diff(other.0)
     }
 }
 
-/// Why a radius is no fingerprint.
+/// Why a radius has no fingerprint.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum FingerprintError {
-    /// The radius is beyond 8188 mm.
+    /// The radius is above 8188 mm.
     TooLarge {
-        /// The radius that was offered, in millimetres.
+        /// The radius, in millimetres.
         radius_mm: u16,
     },
 }
@@ -71,7 +71,7 @@ pub enum FingerprintError {
 impl fmt::Display for FingerprintError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Self::TooLarge { radius_mm } => write!(f, "radius of {radius_mm} mm is beyond 8188 mm"),
+            Self::TooLarge { radius_mm } => write!(f, "radius of {radius_mm} mm is above 8188 mm"),
         }
     }
 }
@@ -83,7 +83,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_radius_survives_quantisation_to_within_half_a_step() {
+    fn quantisation_changes_a_radius_by_at_most_half_a_step() {
         for radius_mm in 0..=8188 {
             let fingerprint = Fingerprint::from_radius_mm(radius_mm).unwrap();
             assert!(fingerprint.radius_mm().abs_diff(radius_mm) * 2 <= Fingerprint::STEP_MM);
@@ -91,7 +91,7 @@ mod tests {
     }
 
     #[test]
-    fn a_radius_beyond_the_range_is_refused() {
+    fn a_radius_above_the_range_is_rejected() {
         let refused = Err(FingerprintError::TooLarge { radius_mm: 8189 });
         assert_eq!(Fingerprint::from_radius_mm(8189), refused);
         assert_eq!(Fingerprint::from_steps(4095), None);

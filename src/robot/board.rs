@@ -1,44 +1,44 @@
-//! What the robot needs of a board, besides its ring of sonars.
+//! The board of a robot: everything but its ring of sensors.
 
 use core::fmt;
 
 use crate::drive::VelocityCommand;
 use crate::wire::QueueFull;
 
-/// A board: its serial line, wheels, clock, watchdog and flash. Nothing here may wait for the other end of anything.
+/// The serial line, wheels, clock, watchdog and flash of a board. No method may wait for the other end of a line.
 pub trait Board {
-    /// A byte that the serial line has received; `None` when there is none (yet).
+    /// Returns the next byte that the serial line has received; `None` if there is none.
     fn receive(&mut self) -> Option<u8>;
 
     /// Queues a whole frame for the serial line.
     ///
     /// # Errors
-    /// [`QueueFull`] when it does not fit whole; nothing is queued then.
+    /// [`QueueFull`] if the whole frame does not fit; nothing is queued then.
     fn send(&mut self, frame: &[u8]) -> Result<(), QueueFull>;
 
-    /// Sets the wheels.
+    /// Sets the wheels to follow a velocity.
     fn follow(&mut self, velocity: VelocityCommand);
 
-    /// Tells the watchdog that the main loop has come round.
+    /// Feeds the watchdog, once in each turn of the main loop.
     fn feed_watchdog(&mut self);
 
     /// The time since the start in milliseconds; it wraps.
     fn now_ms(&mut self) -> u32;
 
-    /// The most stack that was ever in use, in bytes; 0 when nobody measures it.
+    /// The largest stack use since the start in bytes; 0 if it is not measured.
     fn stack_high_water_bytes(&mut self) -> u32;
 
-    /// Keeps a snapshot so that it outlasts a loss of power. The robot stands still meanwhile.
+    /// Stores a snapshot so that it survives a power cut. The robot stands still meanwhile.
     ///
     /// # Errors
-    /// [`SaveError`]; the snapshots before must still be there.
+    /// [`SaveError`]; earlier snapshots must then still be stored.
     fn save(&mut self, snapshot: &[u8]) -> Result<(), SaveError>;
 }
 
-/// Why a snapshot was not kept.
+/// Why a snapshot was not stored.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum SaveError {
-    /// The board has nowhere to keep one.
+    /// The board cannot store snapshots.
     NoStore,
     /// The flash could not be written or erased.
     Failed,
@@ -47,7 +47,7 @@ pub enum SaveError {
 impl fmt::Display for SaveError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(match self {
-            Self::NoStore => "the board has nowhere to keep a snapshot",
+            Self::NoStore => "the board cannot store snapshots",
             Self::Failed => "the flash could not be written or erased",
         })
     }

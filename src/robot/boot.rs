@@ -10,8 +10,8 @@ use crate::wire::Staging;
 impl<'buffer, const SONARS: usize, const N: usize, const V: usize, const HISTORY: usize>
     Robot<'buffer, SONARS, N, V, HISTORY>
 {
-    /// As [`Robot::start`]; then goes on with the newest snapshot in a store, as the policy says. Where the store fails the robot
-    /// has started afresh. A snapshot brings the settings of the filter with it.
+    /// Starts the robot as [`Robot::start`] does, then restores the newest snapshot of a store if the policy says so. Without a
+    /// valid snapshot the map stays empty. A snapshot includes the settings of the filter.
     ///
     /// # Errors
     /// As [`Robot::start`].

@@ -1,4 +1,4 @@
-//! What the robot does when it is told something.
+//! The commands of the serial line, and the status of the goal.
 
 use super::{Board, FRAMES_PER_HELLO, Line, RECEIVED_PER_TURN, Robot, restore, snapshot};
 use crate::drive::{self, Goal};
@@ -6,13 +6,13 @@ use crate::persist::snapshot::Resume;
 use crate::wire::{Command, GoalState, GoalStatus, Info, Message, Outcome, Refusal, Setting, Settings, Version};
 use crate::{FaultKind, RobustFilter, VertexId};
 
-/// No way to a vertex was told of.
-pub(super) const NOTHING: (Goal, drive::GoalStatus) = (Goal::Explore, drive::GoalStatus::Inactive);
+/// No goal status was sent.
+pub(super) const NO_GOAL: (Goal, drive::GoalStatus) = (Goal::Explore, drive::GoalStatus::Inactive);
 
 impl<const SONARS: usize, const N: usize, const V: usize, const HISTORY: usize> Robot<'_, SONARS, N, V, HISTORY> {
-    /// Takes what the line has received, and executes at most one command.
+    /// Reads what the line has received, and executes at most one command.
     #[inline(never)]
-    pub(super) fn obey(&mut self, board: &mut impl Board) {
+    pub(super) fn poll_commands(&mut self, board: &mut impl Board) {
         for _ in 0..RECEIVED_PER_TURN {
             let Some(byte) = board.receive() else { break };
             self.inbox.take(byte);
@@ -22,7 +22,7 @@ impl<const SONARS: usize, const N: usize, const V: usize, const HISTORY: usize> 
         let reply = inbox.turn(|command| self.execute(command, board).unwrap_or_else(Outcome::Refused));
         self.inbox = inbox;
         if let Some(reply) = reply {
-            // A reply that finds no room is asked for again.
+            // A client that misses the reply repeats its request.
             let _ = self.send(&Message::Reply(reply), board);
         }
     }
@@ -36,7 +36,7 @@ impl<const SONARS: usize, const N: usize, const V: usize, const HISTORY: usize> 
                     let Self { mapper, drive, staging, .. } = self;
                     staging.take(|buffer| snapshot(mapper, drive, buffer).ok())?;
                 }
-                return self.staging.piece(offset);
+                return self.staging.outgoing_chunk(offset);
             }
             Command::RestoreBegin { length, crc } => self.staging.begin(length, crc)?,
             Command::RestoreChunk { offset, bytes } => self.staging.chunk(offset, bytes.as_slice())?,
@@ -72,7 +72,7 @@ impl<const SONARS: usize, const N: usize, const V: usize, const HISTORY: usize> 
         }
     }
 
-    /// Goes on with the snapshot that came over the line, wherever the robot is.
+    /// Restores the snapshot that came over the line. The robot may be at any vertex.
     fn restore_staged(&mut self, board: &mut impl Board) -> Result<(), Refusal> {
         let Self { mapper, drive, staging, encoder, faults, .. } = self;
         let bytes = staging.commit()?;
@@ -95,7 +95,7 @@ impl<const SONARS: usize, const N: usize, const V: usize, const HISTORY: usize> 
         drive.start(config.drive, config.mapper.seed).map_err(|_| Refusal::OutOfRange)?;
         self.localise_only = false;
         self.times_lost = 0;
-        self.told = NOTHING;
+        self.sent_goal = NO_GOAL;
         Ok(())
     }
 
@@ -127,16 +127,16 @@ impl<const SONARS: usize, const N: usize, const V: usize, const HISTORY: usize> 
     }
 
     fn set_goal(&mut self, goal: Goal, board: &mut impl Board) {
-        if let (Goal::Vertex(vertex), drive::GoalStatus::Active) = self.told {
+        if let (Goal::Vertex(vertex), drive::GoalStatus::Active) = self.sent_goal {
             let _ = self
                 .send(&Message::GoalStatus(GoalStatus { vertex: vertex.into(), state: GoalState::Replaced }), board);
         }
-        self.told = NOTHING;
+        self.sent_goal = NO_GOAL;
         self.drive.set_goal(goal);
     }
 
-    /// Tells how the way to a vertex goes, whenever that has changed.
-    pub(super) fn tell_journey(&mut self, board: &mut impl Board) {
+    /// Sends the status of the goal whenever it has changed.
+    pub(super) fn send_goal_status(&mut self, board: &mut impl Board) {
         let now = (self.drive.goal(), self.drive.goal_status());
         let (Goal::Vertex(vertex), goal_status) = now else { return };
         let state = match goal_status {
@@ -147,8 +147,8 @@ impl<const SONARS: usize, const N: usize, const V: usize, const HISTORY: usize> 
             drive::GoalStatus::TimedOut => GoalState::TimedOut,
         };
         let message = Message::GoalStatus(GoalStatus { vertex: vertex.into(), state });
-        if self.told != now && self.send(&message, board).is_ok() {
-            self.told = now;
+        if self.sent_goal != now && self.send(&message, board).is_ok() {
+            self.sent_goal = now;
         }
     }
 }

@@ -1,4 +1,4 @@
-//! The robot's settings: those of its stages, and how its main loop runs.
+//! The settings of a robot: those of its stages and of its main loop.
 
 use crate::drive::DriveConfig;
 use crate::persist::snapshot::SnapshotPolicy;
@@ -7,17 +7,17 @@ use crate::setters::setters;
 use crate::wire::{Capacities, Hello, ResetCause};
 use crate::{Filter, MapperConfig, RobustConfig};
 
-/// The settings of every stage.
+/// The settings of a robot.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub struct RobotConfig<const SONARS: usize> {
-    /// From the ring frame to the map.
+    /// The stages from the ring frame to the map.
     pub mapper: MapperConfig<SONARS, RobustConfig>,
-    /// From the map to the wheels.
+    /// The drive.
     pub drive: DriveConfig,
-    /// When snapshots are kept.
+    /// When snapshots are stored.
     pub snapshot: SnapshotPolicy,
-    /// A turn of the main loop that takes longer is counted as a fault, in milliseconds.
+    /// The longest regular turn of the main loop in milliseconds; a longer one is counted as a fault. Default 1000.
     pub turn_bound_ms: u16,
     /// A number that differs from one start of the robot to the next; 0 if there is none.
     pub boot: u32,

@@ -7,7 +7,7 @@
 //! ```
 //!
 //! The firmware of every board and the simulations of a host run this same code. What differs from board to board is a
-//! [`Board`]: bytes in and out, wheels, a clock, a watchdog and somewhere to keep snapshots.
+//! [`Board`]: a serial line, wheels, a clock, a watchdog and a store for snapshots.
 //!
 //! ```
 //! use toposlam::reference::{ROBOT, ReferenceRobot, SNAPSHOT_BYTES, SONARS};
@@ -66,19 +66,19 @@ use crate::{ConfigError, FaultCounters, FaultKind, Mapper, RobustFilter, Update}
 
 /// How often the robot sends a `Hello`, in ring frames.
 const FRAMES_PER_HELLO: u16 = 100;
-/// How often the robot says how it is doing, in turns of the loop.
+/// How often the robot sends a `Health`, in turns of the loop.
 const TURNS_PER_HEALTH: u32 = 256;
-/// More bytes than the inbox looks at in a turn: what a receive buffer may hold.
+/// The most bytes that are read from the board in a turn. The inbox decodes fewer and drops the rest.
 const RECEIVED_PER_TURN: usize = 1024;
 
-/// What a turn brought: the place that the robot has just been at, if at one.
+/// The result of a turn: the place and the map update, if the frame completed a visit to a place.
 pub type Seen = Option<(Place, Update)>;
 
 /// A robot with a ring of `SONARS` and a filter of `N` hypotheses, maps of `V` vertices and a history of `HISTORY` places.
 ///
 /// Const-constructed to zero, so that a `static` of it lies in `.bss`, and set up in place by [`Robot::start`]. Memory: the
 /// mapper's and the drive's, 700 bytes, and the caller's buffer for snapshots. Each turn costs at most what one place or one
-/// slice of polishing costs, and one command.
+/// refinement step costs, and one command.
 #[derive(Debug)]
 pub struct Robot<'buffer, const SONARS: usize, const N: usize, const V: usize, const HISTORY: usize> {
     config: RobotConfig<SONARS>,
@@ -91,22 +91,22 @@ pub struct Robot<'buffer, const SONARS: usize, const N: usize, const V: usize, c
     faults: FaultCounters,
     paused: bool,
     localise_only: bool,
-    /// How often the drive had lost its way when the mapper was last told.
+    /// The count of `DriveLost` when the mapper was last notified.
     times_lost: u32,
-    /// Places since the last snapshot that was kept, and its size; no bytes when there is none.
+    /// The size of the newest stored snapshot, 0 if there is none, and the number of places since.
     stored_bytes: u16,
     places_since: u32,
     turns: u32,
     last_turn_ms: Option<u32>,
     worst_turn_ms: u32,
-    /// What the listener was last told of the way to a vertex.
-    told: (Goal, GoalStatus),
+    /// The goal status that was sent last.
+    sent_goal: (Goal, GoalStatus),
 }
 
 impl<'buffer, const SONARS: usize, const N: usize, const V: usize, const HISTORY: usize>
     Robot<'buffer, SONARS, N, V, HISTORY>
 {
-    /// A robot that waits for [`Robot::start`].
+    /// A robot that has to be started with [`Robot::start`].
     pub const fn new() -> Self {
         Self {
             config: RobotConfig::UNSET,
@@ -125,12 +125,14 @@ impl<'buffer, const SONARS: usize, const N: usize, const V: usize, const HISTORY
             turns: 0,
             last_turn_ms: None,
             worst_turn_ms: 0,
-            told: commands::NOTHING,
+            sent_goal: commands::NO_GOAL,
         }
     }
 
-    /// Starts afresh: no map, exploring. `buffer` is for snapshots on their way to flash or across the line; one of
-    /// [`RobustFilter::SNAPSHOT_BYTES`] and `HISTORY + 16` more has room for every hypothesis, and without one there are none.
+    /// Starts with an empty map, exploring.
+    ///
+    /// `buffer` holds snapshots on their way to the flash or over the line. [`RobustFilter::SNAPSHOT_BYTES`] plus
+    /// `HISTORY + 16` bytes is room for every hypothesis. With an empty buffer the robot makes no snapshots.
     ///
     /// # Errors
     /// [`ConfigError`] names the first setting that is out of its range; the robot must then be started again.
@@ -150,29 +152,29 @@ impl<'buffer, const SONARS: usize, const N: usize, const V: usize, const HISTORY
         self.turns = 0;
         self.last_turn_ms = None;
         self.worst_turn_ms = 0;
-        self.told = commands::NOTHING;
+        self.sent_goal = commands::NO_GOAL;
         Ok(())
     }
 
-    /// One turn of the main loop: takes at most one command, maps the ring frame, drives on, keeps a snapshot when one is due,
-    /// and feeds the watchdog. `ring_faults` are those of the ring's driver so far.
+    /// Runs one turn of the main loop: executes at most one command, maps the ring frame, drives, stores a snapshot if one is
+    /// due, and feeds the watchdog. `ring_faults` are the faults of the ring's driver since the start.
     pub fn turn(&mut self, frame: &RingFrame<SONARS>, ring_faults: &FaultCounters, board: &mut impl Board) -> Seen {
-        self.watch_the_clock(board);
-        self.obey(board);
+        self.check_duration(board);
+        self.poll_commands(board);
         let faults = self.loop_faults(ring_faults);
         let (seen, velocity) =
-            if self.paused { self.stand(&faults, board) } else { self.map_and_drive(frame, &faults, board) };
-        self.tell_ring(frame, board);
-        self.tell_drive(velocity, board);
+            if self.paused { self.pause(&faults, board) } else { self.map_and_drive(frame, &faults, board) };
+        self.send_ring(frame, board);
+        self.send_velocity(velocity, board);
         let is_due = |(_, update): &(Place, Update)| self.policy().is_due(update.place_index);
         if seen.as_ref().is_some_and(is_due) {
             // Erasing flash takes up to seconds; the robot must not drive blindly meanwhile.
             board.follow(VelocityCommand::STOP);
-            self.keep_snapshot(board);
+            self.save_snapshot(board);
             self.last_turn_ms = None;
         }
         board.follow(velocity);
-        self.tell_journey(board);
+        self.send_goal_status(board);
         if self.turns.is_multiple_of(TURNS_PER_HEALTH) {
             let health = Health {
                 uptime_ms: board.now_ms(),
@@ -214,19 +216,19 @@ impl<'buffer, const SONARS: usize, const N: usize, const V: usize, const HISTORY
         (seen, velocity)
     }
 
-    /// A robot that is paused still says what it knows.
-    fn stand(&mut self, faults: &FaultCounters, board: &mut impl Board) -> (Seen, VelocityCommand) {
+    /// A paused robot stands still and keeps sending.
+    fn pause(&mut self, faults: &FaultCounters, board: &mut impl Board) -> (Seen, VelocityCommand) {
         let mut line = Line { encoder: &mut self.encoder, faults: &mut self.faults, board };
         self.reporter.report(&self.mapper, None, faults, |message| line.send(message));
         (None, VelocityCommand::STOP)
     }
 
-    /// Writes a snapshot of the drive and the mapper into the buffer, for the flash.
+    /// Writes a snapshot of drive and mapper to the board's store.
     #[inline(never)]
-    fn keep_snapshot(&mut self, board: &mut impl Board) {
+    fn save_snapshot(&mut self, board: &mut impl Board) {
         let Self { mapper, drive, staging, .. } = self;
-        let kept = staging.take(|buffer| snapshot(mapper, drive, buffer).ok()).map(|()| board.save(staging.taken()));
-        match kept {
+        let taken = staging.take(|buffer| snapshot(mapper, drive, buffer).ok());
+        match taken.map(|()| board.save(staging.taken())) {
             Ok(Ok(())) => {
                 self.stored_bytes = u16::try_from(self.staging.taken().len()).unwrap_or(u16::MAX);
                 self.places_since = 0;
@@ -236,7 +238,7 @@ impl<'buffer, const SONARS: usize, const N: usize, const V: usize, const HISTORY
         }
     }
 
-    /// Goes on with a snapshot, as of the last start or of another robot with the same capacities.
+    /// Restores a snapshot, of this robot or of another one with the same capacities.
     ///
     /// # Errors
     /// [`SnapshotError`] says what is wrong with the bytes; nothing has changed then, and the fault is counted.
@@ -255,7 +257,7 @@ impl<'buffer, const SONARS: usize, const N: usize, const V: usize, const HISTORY
         self.config.snapshot
     }
 
-    fn watch_the_clock(&mut self, board: &mut impl Board) {
+    fn check_duration(&mut self, board: &mut impl Board) {
         let now_ms = board.now_ms();
         if let Some(last_ms) = self.last_turn_ms {
             let turn_ms = now_ms.wrapping_sub(last_ms);
@@ -268,12 +270,12 @@ impl<'buffer, const SONARS: usize, const N: usize, const V: usize, const HISTORY
     }
 
     #[inline(never)]
-    fn tell_ring(&mut self, frame: &RingFrame<SONARS>, board: &mut impl Board) {
+    fn send_ring(&mut self, frame: &RingFrame<SONARS>, board: &mut impl Board) {
         let ring = Message::Ring { frame_index: self.turns, echoes: Echoes::new(&frame.echoes) };
         let _ = self.send(&ring, board);
     }
 
-    fn tell_drive(&mut self, velocity: VelocityCommand, board: &mut impl Board) {
+    fn send_velocity(&mut self, velocity: VelocityCommand, board: &mut impl Board) {
         let drive = wire::Velocity {
             frame_index: self.turns,
             heading_mrad: velocity.heading_mrad,
@@ -287,15 +289,14 @@ impl<'buffer, const SONARS: usize, const N: usize, const V: usize, const HISTORY
         Line { encoder: &mut self.encoder, faults: &mut self.faults, board }.send(message)
     }
 
-    /// Every fault so far, of all stages. `ring_faults` are those of the ring's driver.
+    /// The faults of all stages since the start. `ring_faults` are those of the ring's driver.
     pub fn faults(&self, ring_faults: &FaultCounters) -> FaultCounters {
         let mut faults = self.loop_faults(ring_faults);
-        faults.add(self.mapper.detector().faults());
-        faults.add(self.mapper.filter().faults());
+        faults.add(&self.mapper.faults());
         faults
     }
 
-    /// Those that the mapper does not count itself.
+    /// The faults of all stages but the mapper.
     fn loop_faults(&self, ring_faults: &FaultCounters) -> FaultCounters {
         let mut faults = *ring_faults;
         faults.add(&self.faults);
@@ -304,12 +305,12 @@ impl<'buffer, const SONARS: usize, const N: usize, const V: usize, const HISTORY
         faults
     }
 
-    /// Whether the robot was told to pause: it then takes no ring frames.
+    /// Whether the robot is paused: it then ignores ring frames.
     pub const fn is_paused(&self) -> bool {
         self.paused
     }
 
-    /// All stages up to the map.
+    /// The stages from the ring frame to the map.
     pub const fn mapper(&self) -> &Mapper<SONARS, V, RobustFilter<N, V, HISTORY>> {
         &self.mapper
     }
@@ -328,7 +329,7 @@ impl<const SONARS: usize, const N: usize, const V: usize, const HISTORY: usize> 
     }
 }
 
-/// Messages on their way to the board's queue.
+/// Encodes messages for the board's queue.
 struct Line<'a, BOARD> {
     encoder: &'a mut Encoder,
     faults: &'a mut FaultCounters,
@@ -336,7 +337,7 @@ struct Line<'a, BOARD> {
 }
 
 impl<BOARD: Board> Line<'_, BOARD> {
-    /// Queues a whole message, or drops it and counts that.
+    /// Queues a whole message, or drops and counts it.
     fn send(&mut self, message: &Message) -> Result<(), QueueFull> {
         let mut bytes = [0; MAX_FRAME_BYTES];
         let frame = self.encoder.encode(message, &mut bytes).map_err(|_| QueueFull)?;

@@ -81,7 +81,7 @@ impl<'a> Robot<'a> {
         };
         let degree = (self.hints.degree && missing_degree >= self.hints.missing_percent).then_some(told);
         let begins = carried.is_some_and(|(_, is_told)| is_told);
-        Observation { fingerprint: self.look(place), turn, degree, begins }
+        Observation { fingerprint: self.look(place), turn, degree, starts_sequence: begins }
     }
 
     /// A Gaussian fingerprint of a place: the sum of twelve uniform numbers.

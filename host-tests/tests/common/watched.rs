@@ -118,7 +118,7 @@ impl<const N: usize, const V: usize, const HISTORY: usize> Watched<N, V, HISTORY
             label: f64::from(observation.fingerprint.steps()),
             turned_back: observation.turn.map(|turn| turn == Turn::Back),
             degree: observation.degree.filter(|&degree| degree > 0).map(|degree| usize::from(degree).min(7)),
-            begins: at == 0 || observation.begins,
+            begins: at == 0 || observation.starts_sequence,
         };
         self.observations.iter().enumerate().map(seen).collect()
     }
@@ -211,7 +211,7 @@ impl<const N: usize, const V: usize, const HISTORY: usize> Watched<N, V, HISTORY
         let step_mm = f64::from(Fingerprint::STEP_MM);
         let labels: Vec<f64> = self.observations.iter().map(|seen| f64::from(seen.fingerprint.radius_mm())).collect();
         let is_whole = |&end: &usize| {
-            end + 1 >= N_GRAM && self.observations[end + 2 - N_GRAM..=end].iter().all(|seen| !seen.begins)
+            end + 1 >= N_GRAM && self.observations[end + 2 - N_GRAM..=end].iter().all(|seen| !seen.starts_sequence)
         };
         let ngram = |end: usize| Ngram::new(&labels[end + 1 - N_GRAM..=end]);
         let ends: Vec<usize> = (0..labels.len()).filter(is_whole).collect();

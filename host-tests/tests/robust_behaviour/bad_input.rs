@@ -47,7 +47,7 @@ fn turns_at_the_first_two_places_of_a_sequence_mean_nothing() {
         for place in 0..40 {
             let begins = place == 0 || place == 20;
             let turn = turn.filter(|_| begins || place == 1 || place == 21);
-            filter.observe(Observation { turn, begins, ..robot.step() });
+            filter.observe(Observation { turn, starts_sequence: begins, ..robot.step() });
         }
         (filter.evidence(), filter.path().collect::<Vec<_>>())
     });
@@ -77,7 +77,7 @@ fn a_robot_to_which_every_place_looks_alike_is_told_something_consistent() {
 fn a_robot_that_is_carried_to_every_place_has_a_map_without_edges() {
     let mut watched = Watched::<10, 6, 64>::new(RobustConfig::DEFAULT, 1);
     for radius_mm in [900, 1300, 1700].into_iter().cycle().take(45) {
-        watched.observe(Observation { begins: true, ..seen(radius_mm) });
+        watched.observe(Observation { starts_sequence: true, ..seen(radius_mm) });
         watched.filter.polish();
     }
     assert_eq!(watched.filter.map().vertices().len(), 3);
@@ -92,7 +92,7 @@ fn anything() -> impl Strategy<Value = Observation> {
     let degree = prop_oneof![2 => Just(None), 2 => (1_u8..5).prop_map(Some), 1 => any::<u8>().prop_map(Some)];
     (steps, turn, degree, prop::bool::weighted(0.1)).prop_map(|(steps, turn, degree, begins)| {
         let fingerprint = Fingerprint::from_steps(steps).unwrap();
-        Observation { fingerprint, turn, degree, begins }
+        Observation { fingerprint, turn, degree, starts_sequence: begins }
     })
 }
 

@@ -38,7 +38,7 @@ fn goes_on(filter: &mut Small) {
             fingerprint: Fingerprint::from_steps(steps).unwrap(),
             turn,
             degree: (index % 2 == 0).then_some(3),
-            begins: index % 11 == 10,
+            starts_sequence: index % 11 == 10,
         };
         let update = filter.observe(observation);
         assert!(filter.map().vertices().len() <= 6 && update.vertex.index() < 6);

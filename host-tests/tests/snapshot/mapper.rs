@@ -31,7 +31,7 @@ fn simulation() -> Simulation {
 
 /// Which of its places the filter takes to begin a sequence.
 fn begins_of(mapper: &Mapper<SONARS, VERTICES, Notes>) -> Vec<bool> {
-    mapper.filter().observations.iter().map(|observation| observation.begins).collect()
+    mapper.filter().observations.iter().map(|observation| observation.starts_sequence).collect()
 }
 
 #[test]

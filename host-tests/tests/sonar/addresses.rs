@@ -1,4 +1,4 @@
-//! Changing the addresses of sensors that come from the factory with one for all.
+//! Changing the addresses of new sensors, which all have the same one.
 
 use embedded_hal::i2c::{ErrorKind, NoAcknowledgeSource};
 use embedded_hal_mock::eh1::i2c::{Mock as I2cMock, Transaction};
@@ -16,14 +16,14 @@ use crate::{Waited, world, world_frame};
 const SILENT: ErrorKind = ErrorKind::NoAcknowledge(NoAcknowledgeSource::Address);
 
 #[test]
-fn sixteen_srf08_from_the_factory_become_a_ring_when_they_are_plugged_in_one_after_the_other() {
+fn sixteen_new_srf08_become_a_ring_when_connected_one_by_one() {
     let mut bus = I2cBus { devices: Srf08Bank::new(world(), 3) };
     for sensor in 0..16 {
         bus.devices.set_address(sensor, 0x70);
         bus.devices.set_fault(sensor, Some(SensorFault::Absent));
     }
     let mut waited = Waited::default();
-    // The one that keeps the factory's address comes last.
+    // The sensor that keeps the factory address is connected last.
     for sensor in (0..16).rev() {
         bus.devices.set_fault(sensor, None);
         let address = 0x70 + sensor as u8;
@@ -38,7 +38,7 @@ fn sixteen_srf08_from_the_factory_become_a_ring_when_they_are_plugged_in_one_aft
 }
 
 #[test]
-fn maxbotix_sensors_from_the_factory_become_a_ring_at_other_addresses() {
+fn new_maxbotix_sensors_become_a_ring_at_other_addresses() {
     let time = SimulatedTime::new(0, 0);
     let mut devices = MaxBotixBank::<_, 16>::new(world(), time.clone());
     for sensor in 0..16 {
@@ -57,7 +57,7 @@ fn maxbotix_sensors_from_the_factory_become_a_ring_at_other_addresses() {
 }
 
 #[test]
-fn an_srf08_gets_the_data_sheets_four_messages() {
+fn the_messages_to_an_srf08_are_those_of_the_data_sheet() {
     let expected = [
         Transaction::read(0x79, vec![0; 2]).with_error(SILENT),
         Transaction::write(0x70, vec![0x00, 0xA0]),
@@ -73,7 +73,7 @@ fn an_srf08_gets_the_data_sheets_four_messages() {
 }
 
 #[test]
-fn a_maxbotix_sensor_gets_the_data_sheets_three_bytes_in_one_message() {
+fn the_message_to_a_maxbotix_sensor_is_that_of_the_data_sheet() {
     let expected = [
         Transaction::read(0x65, vec![0; 2]).with_error(SILENT),
         Transaction::write(0x70, vec![170, 165, 0xCA]),
@@ -85,7 +85,7 @@ fn a_maxbotix_sensor_gets_the_data_sheets_three_bytes_in_one_message() {
 }
 
 #[test]
-fn an_address_that_the_sensor_cannot_have_puts_nothing_on_the_bus() {
+fn an_invalid_address_sends_nothing() {
     let mut bus = I2cMock::new(&[]);
     let mut waited = Waited::default();
     for wrong in [0x00, 0x6F, 0x80, 0xE0, 0xFF] {
@@ -105,7 +105,7 @@ fn an_address_that_the_sensor_cannot_have_puts_nothing_on_the_bus() {
 }
 
 #[test]
-fn what_goes_wrong_on_the_bus_is_named_and_ends_in_bounded_time() {
+fn each_bus_failure_has_its_error_and_ends_in_bounded_time() {
     let bank = || I2cBus { devices: Srf08Bank::new(world(), 3) };
     let mut waited = Waited::default();
     assert_eq!(change_srf08_address(&mut bank(), &mut &mut waited, 0x70, 0x71), Err(AddressError::Taken));
@@ -119,7 +119,7 @@ fn what_goes_wrong_on_the_bus_is_named_and_ends_in_bounded_time() {
     assert_eq!(change_srf08_address(&mut bus, &mut &mut waited, 0x70, 0x71), Err(AddressError::Bus));
     assert_eq!(waited.nanoseconds, 0);
 
-    // A device at the address that is no such sensor: it takes the messages and stays where it is.
+    // Another device at the address: it acknowledges the messages and keeps its address.
     let mut stubborn: Vec<_> = [vec![0, 0xA0], vec![0, 0xAA], vec![0, 0xA5], vec![0, 0xE2]]
         .into_iter()
         .map(|bytes| Transaction::write(0x70, bytes))

@@ -1,4 +1,4 @@
-//! Whatever the sensors answer, and whichever of them answer, a ring gives a frame.
+//! A ring returns a valid frame for arbitrary answers of its sensors.
 
 use embedded_hal::{
     digital,
@@ -16,7 +16,7 @@ use toposlam_sim::chip::{HcSr04Bank, HcSr04Fault, I2cBus, MaxBotixBank, SensorFa
 
 use crate::{Waited, without, world, world_frame};
 
-/// A bus, pins and a clock that answer with the bytes they are given, over and over.
+/// A bus, pins and a clock whose answers follow from a cyclic sequence of bytes.
 #[derive(Clone)]
 struct Noise {
     bytes: Vec<u8>,
@@ -84,13 +84,13 @@ impl digital::OutputPin for Noise {
 }
 
 impl MicrosecondClock for Noise {
-    /// Forwards, backwards, or not at all.
+    /// Advances, goes back, or stops.
     fn now_us(&mut self) -> u32 {
         u32::from_le_bytes(std::array::from_fn(|_| self.byte()))
     }
 }
 
-/// Every echo is in range, and the faults are as many as the dead sensors.
+/// Every echo is in range, and there is one fault for each dead sensor.
 fn assert_sound(frame: RingFrame<16>, faults: &FaultCounters, nearest_mm: u16, farthest_mm: u16) {
     for range_mm in frame.echoes.into_iter().filter_map(Echo::range_mm) {
         assert!((nearest_mm..=farthest_mm).contains(&range_mm), "{range_mm} mm");
@@ -107,7 +107,7 @@ proptest! {
             let mut ring = Srf08Ring::new(Noise::of(bytes.clone()), &mut waited, config).unwrap();
             let mut faults = FaultCounters::new();
             assert_sound(ring.read(&mut faults), &faults, 30, 6000);
-            // 50 rounds of asking at most, in two groups.
+            // At most 50 polls of each sensor, in two groups.
             prop_assert!(ring.release().0.transfers <= 16 * 51);
             prop_assert!(waited.nanoseconds <= 2 * 100_000_000);
         }

@@ -7,7 +7,7 @@ use toposlam_sim::chip;
 
 use crate::link::{Link, NoError};
 
-/// One device that takes everything and answers with a fixed text.
+/// A device that acknowledges everything and answers with a fixed text.
 struct Reciter(Vec<u8>);
 
 impl chip::I2cDevices for Reciter {
@@ -31,7 +31,7 @@ fn bridge_to(text: &[u8]) -> Sc18im700<Link<Reciter>> {
 }
 
 #[test]
-fn the_bridge_driver_sends_the_data_sheets_messages() {
+fn the_messages_to_the_bridge_are_those_of_the_data_sheet() {
     let mut bridge = bridge_to(&[1, 2, 3]);
     let mut data = [0; 3];
     bridge.write(0x50, &[0xAA, 0xBB]).unwrap();
@@ -47,7 +47,7 @@ fn the_bridge_driver_sends_the_data_sheets_messages() {
 }
 
 #[test]
-fn adjacent_operations_of_one_kind_are_one_run_on_the_bus() {
+fn adjacent_operations_of_one_kind_are_merged() {
     use embedded_hal::i2c::Operation::{Read, Write};
     let mut bridge = bridge_to(&[1, 2, 3]);
     let (mut first, mut second) = ([0; 2], [0; 1]);
@@ -58,7 +58,7 @@ fn adjacent_operations_of_one_kind_are_one_run_on_the_bus() {
 }
 
 #[test]
-fn data_that_looks_like_a_failure_is_still_data() {
+fn data_equal_to_a_failure_code_is_data() {
     for text in [[0xF1, 0xF1, 0xF1, 0xF1], [0xF8, 0x26, 0xF0, 0x26], [0x26, 0x67, 0xF1, 0x26]] {
         for count in 1..=4 {
             let mut data = vec![0; count];
@@ -78,17 +78,17 @@ fn each_failure_of_the_bus_has_its_error() {
     assert_eq!(bridge.read(0x50, &mut [0; 17]), Err(BridgeError::TooLong));
     assert_eq!(bridge.set_baud_rate(0), Err(BridgeError::BaudRate));
     assert_eq!(bridge.set_baud_rate(112), Err(BridgeError::BaudRate));
-    // None of it leaves the bridge out of step.
+    // After each failure the next message works.
     assert_eq!(bridge.read(0x50, &mut [0; 16]), Ok(()));
 }
 
 #[test]
-fn a_reply_that_lost_or_gained_a_byte_is_an_error_and_the_next_message_works() {
+fn a_lost_or_doubled_byte_is_an_error_and_the_next_message_works() {
     for lost in [true, false] {
         let mut bridge = bridge_to(&[9]);
         bridge.read(0x50, &mut [0; 2]).unwrap();
         let mut link = bridge.release();
-        // A late byte of an earlier message is thrown away before the next one is sent.
+        // A late byte of an earlier message is discarded before the next one is sent.
         link.incoming.push_back(0x55);
         let mut bridge = Sc18im700::new(Trouble { link, lost, done: false }, 100);
         let answer = bridge.read(0x50, &mut [0; 4]);

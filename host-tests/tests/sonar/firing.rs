@@ -1,4 +1,4 @@
-//! The firing plan: sensors that fire together hear each other, and a plan that keeps them apart prevents it.
+//! The firing plan: sensors that fire together receive each other's sound, and a plan with separate groups prevents it.
 
 use toposlam::{
     FaultCounters,
@@ -11,7 +11,7 @@ use toposlam_sim::chip::{HcSr04Bank, I2cBus, MaxBotixBank, SimulatedTime, Srf08B
 
 use crate::Waited;
 
-/// Near walls on the even sides, far ones on the odd sides, in whole centimetres.
+/// Near walls at the even sensors, far walls at the odd ones, in whole centimetres.
 fn rough() -> RingFrame<16> {
     let mut frame = RingFrame { echoes: [Echo::Silence; 16] };
     for (sensor, echo) in (0_u16..).zip(&mut frame.echoes) {
@@ -20,7 +20,7 @@ fn rough() -> RingFrame<16> {
     frame
 }
 
-/// Every odd side then seems as near as the nearer of its neighbours; the even ones hear themselves first.
+/// With crosstalk an odd sensor measures the range of its nearer neighbour; an even one receives its own echo first.
 fn disturbed() -> RingFrame<16> {
     let (heard, mut frame) = (rough().echoes, rough());
     for sensor in (1..16).step_by(2) {
@@ -35,13 +35,13 @@ fn assert_separates(name: &str, read: impl Fn(FiringPlan<16>) -> RingFrame<16>) 
     for groups in [2, 3, 4, 5, 16] {
         assert_eq!(read(FiringPlan::interleaved(groups)), rough(), "{name} in {groups} groups");
     }
-    // Pairs of neighbours are a bad plan, and show it.
+    // A plan that fires pairs of neighbours has crosstalk.
     let pairs = FiringPlan { group_of: std::array::from_fn(|sensor| (sensor / 2) as u8) };
     assert_ne!(read(pairs), rough(), "{name} in pairs");
 }
 
 #[test]
-fn srf08_that_fire_together_disturb_their_neighbours_and_the_plan_prevents_it() {
+fn srf08_have_crosstalk_when_fired_together_and_none_in_separate_groups() {
     assert_separates("SRF08", |plan| {
         let mut devices = Srf08Bank::new(|| Some(rough()), 3);
         devices.set_cross_talk(true);
@@ -51,7 +51,7 @@ fn srf08_that_fire_together_disturb_their_neighbours_and_the_plan_prevents_it() 
 }
 
 #[test]
-fn maxbotix_that_fire_together_disturb_their_neighbours_and_the_plan_prevents_it() {
+fn maxbotix_have_crosstalk_when_fired_together_and_none_in_separate_groups() {
     assert_separates("MaxBotix", |plan| {
         let time = SimulatedTime::new(0, 0);
         let mut devices = MaxBotixBank::new(|| Some(rough()), time.clone());
@@ -62,7 +62,7 @@ fn maxbotix_that_fire_together_disturb_their_neighbours_and_the_plan_prevents_it
 }
 
 #[test]
-fn hc_sr04_that_fire_together_disturb_their_neighbours_and_the_plan_prevents_it() {
+fn hc_sr04_have_crosstalk_when_fired_together_and_none_in_separate_groups() {
     assert_separates("HC-SR04", |plan| {
         let time = SimulatedTime::new(0, 1000);
         let bank = HcSr04Bank::new(|| Some(rough()), time.clone());

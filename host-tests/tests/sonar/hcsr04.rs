@@ -17,7 +17,7 @@ use crate::{World, assert_counted, without};
 
 type Ring = HcSr04Ring<TriggerPin<World, 16>, EchoPin<World, 16>, SimulatedTime, SimulatedTime, 16>;
 
-/// A frame in which every sensor hears something else from 20 to 4000 mm, with silence in two places.
+/// A frame with a different range from 20 to 4000 mm for each sensor, and silence at two of them.
 fn near_frame(number: u16) -> RingFrame<16> {
     let mut frame = RingFrame { echoes: [Echo::Silence; 16] };
     for (sensor, echo) in (0_u16..).zip(&mut frame.echoes).filter(|(sensor, _)| sensor % 8 != 5) {
@@ -36,21 +36,21 @@ fn ring(config: HcSr04Config<16>, time: &SimulatedTime) -> (Ring, HcSr04Bank<Wor
     (HcSr04Ring::new(bank.pins(), time.clone(), time.clone(), config).unwrap(), bank)
 }
 
-/// Every range is as exact as a turn of the polling loop is short: here 2 µs, a third of a millimetre.
-fn assert_heard(heard: RingFrame<16>, expected: RingFrame<16>) {
-    for (sensor, (heard, expected)) in heard.echoes.into_iter().zip(expected.echoes).enumerate() {
-        match (heard.range_mm(), expected.range_mm()) {
+/// The resolution of a range is one iteration of the polling loop: here 2 µs, a third of a millimetre.
+fn assert_measured(measured: RingFrame<16>, expected: RingFrame<16>) {
+    for (sensor, (measured, expected)) in measured.echoes.into_iter().zip(expected.echoes).enumerate() {
+        match (measured.range_mm(), expected.range_mm()) {
             (Some(heard_mm), Some(expected_mm)) => {
                 assert!(heard_mm.abs_diff(expected_mm) <= 1, "sensor {sensor}: {heard_mm} for {expected_mm} mm");
             }
-            _ => assert_eq!(heard, expected, "sensor {sensor}"),
+            _ => assert_eq!(measured, expected, "sensor {sensor}"),
         }
     }
 }
 
 #[test]
-fn the_ring_reads_the_world_and_takes_60_ms_for_each_group() {
-    // The second clock starts again at 0 in the middle of a frame.
+fn the_ring_measures_the_world_and_takes_60_ms_for_each_group() {
+    // The second clock wraps in the middle of a frame.
     for start_us in [0, (1 << 32) - 100_000] {
         for groups in [1, 2, 4, 16] {
             let time = SimulatedTime::new(start_us, 2000);
@@ -58,13 +58,13 @@ fn the_ring_reads_the_world_and_takes_60_ms_for_each_group() {
             let (mut ring, bank) = ring(config, &time);
             let mut faults = FaultCounters::new();
             for number in 0..10 {
-                assert_heard(ring.read(&mut faults), near_frame(number));
+                assert_measured(ring.read(&mut faults), near_frame(number));
                 assert_eq!(ring.last_error(), None);
             }
             assert_eq!(faults, FaultCounters::new());
             assert_eq!(bank.ignored_triggers(), 0);
             let passed_ms = (time.now_ns() - start_us * 1000) / 1_000_000;
-            // Nothing follows on the last group, so only its pulses are waited for.
+            // The last group waits for its pulses only.
             let cycles = 10 * u64::from(groups);
             assert!((60 * (cycles - 1)..60 * cycles + 1).contains(&passed_ms), "{passed_ms} ms in {groups} groups");
         }
@@ -72,7 +72,7 @@ fn the_ring_reads_the_world_and_takes_60_ms_for_each_group() {
 }
 
 #[test]
-fn a_sensor_in_trouble_is_dead_and_counted_and_the_others_go_on() {
+fn a_faulty_sensor_is_dead_and_counted_and_the_others_are_read() {
     let cases = [
         (HcSr04Fault::NeverRises, SonarFault::Silent),
         (HcSr04Fault::HeldHigh, SonarFault::Stuck),
@@ -87,7 +87,10 @@ fn a_sensor_in_trouble_is_dead_and_counted_and_the_others_go_on() {
             bank.set_fault(sensor.into(), Some(defect));
             let mut faults = FaultCounters::new();
             for number in 0..3 {
-                assert_heard(ring.read(&mut faults), without(near_frame(number), |dead| dead == usize::from(sensor)));
+                assert_measured(
+                    ring.read(&mut faults),
+                    without(near_frame(number), |dead| dead == usize::from(sensor)),
+                );
                 assert_eq!(ring.last_error(), Some(SonarError { sensor, fault }), "{defect:?}");
             }
             assert_counted(&faults, Some(fault), 3);
@@ -97,27 +100,27 @@ fn a_sensor_in_trouble_is_dead_and_counted_and_the_others_go_on() {
 }
 
 #[test]
-fn a_clone_that_holds_its_line_for_ever_is_silence_once_and_stuck_until_it_is_healed() {
+fn a_clone_that_holds_its_line_is_silent_once_and_then_stuck_until_repaired() {
     let time = SimulatedTime::new(0, 2000);
     let (mut ring, bank) = ring(HcSr04Config::DEFAULT, &time);
     bank.set_fault(3, Some(HcSr04Fault::NeverFalls));
     let mut faults = FaultCounters::new();
     let mut expected = near_frame(0);
     expected.echoes[3] = Echo::Silence;
-    assert_heard(ring.read(&mut faults), expected);
+    assert_measured(ring.read(&mut faults), expected);
     assert_eq!(ring.last_error(), None);
     for number in 1..4 {
-        assert_heard(ring.read(&mut faults), without(near_frame(number), |sensor| sensor == 3));
+        assert_measured(ring.read(&mut faults), without(near_frame(number), |sensor| sensor == 3));
         assert_eq!(ring.last_error(), Some(SonarError { sensor: 3, fault: SonarFault::Stuck }));
     }
     assert_counted(&faults, Some(SonarFault::Stuck), 3);
     assert!(time.now_ns() < 4 * 4 * 60_000_000 + 1_000_000);
     bank.set_fault(3, None);
-    assert_heard(ring.read(&mut faults), near_frame(4));
+    assert_measured(ring.read(&mut faults), near_frame(4));
 }
 
 #[test]
-fn a_clone_that_gives_up_late_is_silence_in_every_frame() {
+fn a_clone_with_a_long_pulse_is_silent_in_every_frame() {
     let time = SimulatedTime::new(0, 2000);
     let (mut ring, bank) = ring(HcSr04Config::DEFAULT, &time);
     bank.set_fault(3, Some(HcSr04Fault::GivesUpLate));
@@ -125,13 +128,13 @@ fn a_clone_that_gives_up_late_is_silence_in_every_frame() {
     for number in 0..5 {
         let mut expected = near_frame(number);
         expected.echoes[3] = Echo::Silence;
-        assert_heard(ring.read(&mut faults), expected);
+        assert_measured(ring.read(&mut faults), expected);
     }
     assert_eq!(faults, FaultCounters::new());
 }
 
 #[test]
-fn when_the_clock_stands_still_the_ring_says_so_in_bounded_time() {
+fn a_stopped_clock_is_detected_in_bounded_time() {
     let mut time = SimulatedTime::new(0, 0);
     let (mut ring, _bank) = ring(HcSr04Config::DEFAULT.with_stopped_clock_polls(500), &time);
     let mut faults = FaultCounters::new();
@@ -142,7 +145,7 @@ fn when_the_clock_stands_still_the_ring_says_so_in_bounded_time() {
     assert!(time.now_us() < 4 * 61_000);
 }
 
-/// A clock that tells what it was told to tell.
+/// A clock that returns given times.
 struct Recited(VecDeque<u32>);
 
 impl MicrosecondClock for Recited {
@@ -152,10 +155,10 @@ impl MicrosecondClock for Recited {
 }
 
 #[test]
-fn the_driver_moves_the_pins_as_the_data_sheet_says() {
+fn the_signals_on_the_pins_are_those_of_the_data_sheet() {
     use State::{High, Low};
     let trigger = || PinMock::new(&[Pin::set(High), Pin::set(Low)]);
-    // At rest; then a look in each turn until it is settled. 5831 us are 1000 mm, 11,662 us are 2000 mm.
+    // Low before the trigger; then one read in each iteration until it is done. 5831 us are 1000 mm, 11,662 us are 2000 mm.
     let echo = |levels: &[State]| PinMock::new(&levels.iter().map(|&level| Pin::get(level)).collect::<Vec<_>>());
     let pins = [
         (trigger(), echo(&[Low, Low, High, High, Low])),
@@ -163,7 +166,7 @@ fn the_driver_moves_the_pins_as_the_data_sheet_says() {
         (trigger(), echo(&[Low, High, High, High, Low])),
         (PinMock::new(&[]), echo(&[High])),
     ];
-    // The first group: start, four turns. Then a look for the pause, and the second group.
+    // The first group: start, four iterations. Then a read for the cycle time, and the second group.
     let clock = Recited([100, 500, 600, 6331, 12_262, 30_100, 60_100, 60_600, 66_431].into());
     let waits = [Wait::delay_us(12), Wait::delay_us(30_000), Wait::delay_us(12)];
     let config = HcSr04Config::DEFAULT.with_plan(FiringPlan::interleaved(2));

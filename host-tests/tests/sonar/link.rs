@@ -1,11 +1,11 @@
-//! A UART with a model of the bridge at its other end.
+//! A UART connected to a model of the bridge.
 
 use std::{collections::VecDeque, convert::Infallible};
 
 use embedded_hal_nb::{nb, serial};
 use toposlam_sim::chip;
 
-/// A UART whose other end is a model of the bridge; it can be cut.
+/// A UART connected to a model of the bridge. The connection can be cut.
 pub(crate) struct Link<DEVICES> {
     pub(crate) chip: chip::Sc18im700<DEVICES>,
     pub(crate) incoming: VecDeque<u8>,
@@ -23,7 +23,7 @@ impl<DEVICES> serial::ErrorType for Link<DEVICES> {
     type Error = NoError;
 }
 
-/// The link itself has no errors.
+/// The link has no errors of its own.
 #[derive(Debug)]
 pub(crate) struct NoError(Infallible);
 

@@ -1,4 +1,4 @@
-//! The sonar drivers: the exact traffic of the data sheets, and every way a ring can fail, against models of the sensors.
+//! The sonar drivers against models of the sensors: the traffic of the data sheets, and every fault of a ring.
 
 mod addresses;
 mod any_answers;
@@ -17,7 +17,7 @@ use toposlam::{
     ring::{Echo, RingFrame},
 };
 
-/// Counts the time that the driver waits.
+/// Sums the delays of a driver.
 #[derive(Default)]
 pub(crate) struct Waited {
     pub(crate) nanoseconds: u64,
@@ -29,7 +29,7 @@ impl DelayNs for &mut Waited {
     }
 }
 
-/// A frame in which every sensor hears something else, with silence in two places.
+/// A frame with a different range for each sensor, and silence at two of them.
 pub(crate) fn world_frame(number: u16) -> RingFrame<16> {
     let mut frame = RingFrame { echoes: [Echo::Silence; 16] };
     for (sensor, echo) in (0_u16..).zip(&mut frame.echoes).filter(|(sensor, _)| sensor % 8 != 5) {
@@ -46,7 +46,7 @@ pub(crate) fn world() -> impl FnMut() -> Option<RingFrame<16>> {
 /// A source of frames.
 pub(crate) type World = Box<dyn FnMut() -> Option<RingFrame<16>>>;
 
-/// Holds that so many faults of one kind were counted, and no others.
+/// Asserts the count of one kind of fault, and that no other was counted.
 pub(crate) fn assert_counted(faults: &FaultCounters, fault: Option<SonarFault>, count: u32) {
     for kind in FaultKind::ALL {
         let expected = if fault.map(SonarFault::kind) == Some(kind) { count } else { 0 };
@@ -54,7 +54,7 @@ pub(crate) fn assert_counted(faults: &FaultCounters, fault: Option<SonarFault>, 
     }
 }
 
-/// What is left of a frame when some sensors say nothing.
+/// A frame with some sensors dead.
 pub(crate) fn without(mut frame: RingFrame<16>, dead: impl Fn(usize) -> bool) -> RingFrame<16> {
     for sensor in (0..16).filter(|&sensor| dead(sensor)) {
         frame.echoes[sensor] = Echo::Dead;

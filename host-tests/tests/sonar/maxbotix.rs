@@ -14,7 +14,7 @@ use toposlam_sim::chip::{I2cBus, MaxBotixBank, SensorFault, SimulatedTime};
 
 use crate::{World, assert_counted, without, world, world_frame};
 
-/// The world as these sensors tell it: in whole centimetres from 20 on.
+/// A frame as these sensors measure it: in whole centimetres, from 20.
 fn in_centimetres(mut frame: RingFrame<16>) -> RingFrame<16> {
     for echo in &mut frame.echoes {
         if let Echo::Range { range_mm } = echo {
@@ -37,7 +37,7 @@ fn ring(
 }
 
 #[test]
-fn the_ring_reads_the_world_in_centimetres_and_takes_100_ms_for_each_group() {
+fn the_ring_measures_in_centimetres_and_takes_100_ms_for_each_group() {
     for groups in [1, 2, 4] {
         let time = SimulatedTime::new(0, 0);
         let config = MaxBotixConfig::DEFAULT.with_plan(FiringPlan::interleaved(groups));
@@ -56,7 +56,7 @@ fn the_ring_reads_the_world_in_centimetres_and_takes_100_ms_for_each_group() {
 }
 
 #[test]
-fn a_sensor_in_trouble_is_dead_and_counted_and_the_frame_takes_no_longer() {
+fn a_faulty_sensor_is_dead_and_counted_and_does_not_lengthen_the_frame() {
     let cases = [
         (SensorFault::Absent, SonarFault::Silent),
         (SensorFault::NeverDone, SonarFault::Silent),
@@ -82,9 +82,9 @@ fn a_sensor_in_trouble_is_dead_and_counted_and_the_frame_takes_no_longer() {
 }
 
 #[test]
-fn the_driver_puts_the_data_sheets_bytes_on_the_bus_at_the_data_sheets_times() {
+fn the_messages_and_their_times_are_those_of_the_data_sheet() {
     let silent = ErrorKind::NoAcknowledge(NoAcknowledgeSource::Address);
-    // 0x0123 cm are 291, 0x02FD are 765: nothing heard.
+    // 0x0123 is 291 cm; 0x02FD is 765, no echo.
     let expected = [
         Transaction::write(0x70, vec![81]),
         Transaction::write(0x72, vec![81]),

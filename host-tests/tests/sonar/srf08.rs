@@ -1,4 +1,4 @@
-//! The ring of SRF08, behind the bridge and on a bus of its own.
+//! The ring of SRF08, on the bridge and on an I2C bus.
 
 use embedded_hal::i2c::{ErrorKind, NoAcknowledgeSource};
 use embedded_hal_mock::eh1::i2c::{Mock as I2cMock, Transaction};
@@ -37,7 +37,7 @@ fn ring_with_fault(
 }
 
 #[test]
-fn the_ring_reads_the_world_as_it_is_together_or_in_groups() {
+fn the_ring_measures_the_world_in_one_group_or_several() {
     for firing_groups in [1, 2, 3, 4, 16] {
         let mut waited = Waited::default();
         let config = Srf08Config::DEFAULT.with_plan(FiringPlan::interleaved(firing_groups));
@@ -48,13 +48,13 @@ fn the_ring_reads_the_world_as_it_is_together_or_in_groups() {
             assert_eq!(ring.last_error(), None);
         }
         assert_eq!(faults, FaultCounters::new());
-        // Three polls say "ranging", the fourth has the answer.
+        // Three polls find the sensor busy, the fourth returns the range.
         assert_eq!(waited.nanoseconds, 50 * u64::from(firing_groups) * 4 * 2_000_000);
     }
 }
 
 #[test]
-fn a_sensor_in_trouble_is_dead_and_counted_and_the_others_go_on() {
+fn a_faulty_sensor_is_dead_and_counted_and_the_others_are_read() {
     let cases = [
         (SensorFault::Absent, Echo::Dead, Some(SonarFault::Silent)),
         (SensorFault::NeverDone, Echo::Dead, Some(SonarFault::Silent)),
@@ -83,7 +83,7 @@ fn a_sensor_in_trouble_is_dead_and_counted_and_the_others_go_on() {
 }
 
 #[test]
-fn a_sensor_that_never_finishes_costs_no_more_than_the_time_out() {
+fn a_sensor_that_never_finishes_takes_at_most_the_timeout() {
     let mut waited = Waited::default();
     let plan = FiringPlan::together();
     let config = Srf08Config::DEFAULT.with_plan(plan).with_timeout_ms(100).with_poll_interval_us(3000);
@@ -93,7 +93,7 @@ fn a_sensor_that_never_finishes_costs_no_more_than_the_time_out() {
 }
 
 #[test]
-fn when_the_bridge_is_cut_off_every_sensor_is_dead_and_a_healed_line_works_again() {
+fn with_the_bridge_disconnected_every_sensor_is_dead_and_a_repaired_line_works_again() {
     let mut waited = Waited::default();
     let mut ring = ring(world(), Srf08Config::DEFAULT, &mut waited);
     let mut faults = FaultCounters::new();
@@ -113,7 +113,7 @@ fn when_the_bridge_is_cut_off_every_sensor_is_dead_and_a_healed_line_works_again
 }
 
 #[test]
-fn after_the_last_frame_of_the_world_the_ring_is_dead_and_does_not_hang() {
+fn after_the_last_frame_of_the_world_all_sensors_are_dead_and_the_ring_does_not_hang() {
     let mut waited = Waited::default();
     let mut frames = [world_frame(0)].into_iter();
     let mut ring = ring(move || frames.next(), Srf08Config::DEFAULT, &mut waited);
@@ -124,9 +124,9 @@ fn after_the_last_frame_of_the_world_the_ring_is_dead_and_does_not_hang() {
 }
 
 #[test]
-fn the_srf08_driver_puts_the_data_sheets_bytes_on_the_bus() {
+fn the_messages_are_those_of_the_data_sheet() {
     let nack = ErrorKind::NoAcknowledge(NoAcknowledgeSource::Address);
-    // 1000 mm and back at 343 m/s are 5831 us; 2000 mm are 11,662 us.
+    // The round trip of 1000 mm at 343 m/s takes 5831 us; that of 2000 mm takes 11,662 us.
     let expected = [
         Transaction::write(0x70, vec![0x00, 0x52]),
         Transaction::write(0x72, vec![0x00, 0x52]),
@@ -149,7 +149,7 @@ fn the_srf08_driver_puts_the_data_sheets_bytes_on_the_bus() {
 }
 
 #[test]
-fn together_means_one_write_to_the_general_call_address() {
+fn a_single_group_starts_with_one_message_to_the_general_call_address() {
     let expected = [
         Transaction::write(0x00, vec![0x00, 0x52]),
         Transaction::write_read(0x70, vec![0x00], vec![0x06, 0x80, 0x16, 0xC7]),

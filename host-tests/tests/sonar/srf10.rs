@@ -1,4 +1,4 @@
-//! The ring of SRF10: the SRF08's driver, sensors that keep silent while they range.
+//! The ring of SRF10: the driver of the SRF08, and sensors that do not acknowledge while they measure.
 
 use embedded_hal::i2c::{ErrorKind, NoAcknowledgeSource};
 use embedded_hal_mock::eh1::i2c::{Mock as I2cMock, Transaction};
@@ -12,7 +12,7 @@ use toposlam_sim::chip::{I2cBus, SensorFault, Srf08Bank};
 use crate::{Waited, World, assert_counted, without, world, world_frame};
 
 #[test]
-fn sensors_that_are_silent_while_they_range_are_read_in_any_plan() {
+fn sensors_that_do_not_acknowledge_while_they_measure_are_read_with_any_plan() {
     for groups in [1, 2, 3, 16] {
         let config = Srf08Config::SRF10.with_plan(FiringPlan::interleaved(groups));
         let mut waited = Waited::default();
@@ -27,7 +27,7 @@ fn sensors_that_are_silent_while_they_range_are_read_in_any_plan() {
 }
 
 #[test]
-fn a_sensor_that_stays_silent_is_dead_after_the_time_out_and_the_others_go_on() {
+fn a_sensor_that_never_acknowledges_is_dead_after_the_timeout_and_the_others_are_read() {
     for defect in [SensorFault::Absent, SensorFault::NeverDone] {
         let mut devices = Srf08Bank::srf10(Box::new(world()) as World, 3);
         devices.set_fault(9, Some(defect));
@@ -44,7 +44,7 @@ fn a_sensor_that_stays_silent_is_dead_after_the_time_out_and_the_others_go_on() 
 }
 
 #[test]
-fn even_a_plan_that_fires_all_together_starts_each_sensor_at_its_own_address() {
+fn a_single_group_starts_each_sensor_at_its_own_address() {
     let silent = ErrorKind::NoAcknowledge(NoAcknowledgeSource::Address);
     // Register 1 of the SRF10 is unused and reads 0x80.
     let expected = [

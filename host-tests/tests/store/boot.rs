@@ -49,7 +49,7 @@ fn the_policy_says_whether_the_robot_goes_on_with_its_map() {
     let (mapper, mut store) = after(30, 10);
     let (fresh, report, number) = start(&mut store, BootPolicy::Fresh);
     assert_eq!((fresh.map().vertices().len(), report.outcome, number), (0, BootOutcome::Fresh, Some(2)));
-    for (policy, number) in [(BootPolicy::ContinueElsewhere, 3), (BootPolicy::ContinueInPlace, 4)] {
+    for (policy, number) in [(BootPolicy::ContinueAtUnknownVertex, 3), (BootPolicy::ContinueInPlace, 4)] {
         let (restored, report, start) = start(&mut store, policy);
         assert!(matches!(report.outcome, BootOutcome::Continued(_)), "{report:?}");
         assert_eq!((start, report.rejected, report.store), (Some(number), 0, None));
@@ -115,11 +115,11 @@ fn snapshots_that_cannot_be_taken_give_way_to_the_one_before() {
     let mut damaged = newest(&mut store).unwrap();
     damaged[100] ^= 1;
     store.save(&damaged).unwrap();
-    let (restored, report, _) = start(&mut store, BootPolicy::ContinueElsewhere);
+    let (restored, report, _) = start(&mut store, BootPolicy::ContinueAtUnknownVertex);
     assert_eq!((report.rejected, report.why), (1, Some(SnapshotError::Corrupt)));
     assert_eq!(map_digest(restored.map()), map_digest(mapper.map()));
     store.save(b"something else").unwrap();
-    let (restored, report, _) = start(&mut store, BootPolicy::ContinueElsewhere);
+    let (restored, report, _) = start(&mut store, BootPolicy::ContinueAtUnknownVertex);
     assert_eq!((report.rejected, report.why), (2, Some(SnapshotError::Corrupt)));
     assert_eq!(restored.filter().observed(), 20);
     // Of another robot.
@@ -130,7 +130,7 @@ fn snapshots_that_cannot_be_taken_give_way_to_the_one_before() {
     writer.stage(&mut other).unwrap();
     let length = writer.finish().unwrap();
     store.save(&buffer[..length]).unwrap();
-    let (_, report, _) = start(&mut store, BootPolicy::ContinueElsewhere);
+    let (_, report, _) = start(&mut store, BootPolicy::ContinueAtUnknownVertex);
     assert_eq!(report.rejected, 3);
 }
 

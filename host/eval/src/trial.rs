@@ -125,7 +125,7 @@ impl<'a> Trial<'a> {
 /// third.
 fn begin(mut visits: Vec<Visit>) -> Vec<Visit> {
     visits.iter_mut().take(2).for_each(|visit| visit.observation.turn = None);
-    visits.iter_mut().take(1).for_each(|visit| visit.observation.begins = true);
+    visits.iter_mut().take(1).for_each(|visit| visit.observation.starts_sequence = true);
     visits
 }
 
@@ -185,7 +185,7 @@ mod tests {
             let trial = Trial::draw(&environment, &walks, &settings(prior), 3);
             assert_eq!((trial.mapped_before().len(), trial.places_before()), (count, 5 * count));
             for sequence in trial.ngrams.iter().chain([&trial.visits]) {
-                let begins = sequence.iter().map(|visit| visit.observation.begins);
+                let begins = sequence.iter().map(|visit| visit.observation.starts_sequence);
                 assert!(begins.eq((0..sequence.len()).map(|step| step == 0)));
                 let turns = sequence.iter().map(|visit| visit.observation.turn.is_some());
                 assert!(turns.eq((0..sequence.len()).map(|step| step >= 2)));

@@ -24,8 +24,12 @@ pub(crate) fn robust<const N: usize, const V: usize, const HISTORY: usize>(filte
     }
     for _ in 0..black_box(3) {
         black_box(filter.observe(any_fingerprint()));
-        let observation =
-            Observation { fingerprint: any_fingerprint(), turn: any_turn(), degree: black_box(Some(3)), begins: false };
+        let observation = Observation {
+            fingerprint: any_fingerprint(),
+            turn: any_turn(),
+            degree: black_box(Some(3)),
+            starts_sequence: false,
+        };
         black_box(filter.observe(observation.opaque()));
         filter.polish();
         filter.set_localise_only(black_box(true));

@@ -288,7 +288,7 @@ mod tests {
         for index in 0..32 {
             let steps = 500 + 60 * (index as u16 * 7 % 4) + index as u16 % 5;
             let observation = Observation::new(Fingerprint::from_steps(steps).unwrap());
-            record.push(&Observation { begins: index % 12 == 0, degree: Some(2), ..observation });
+            record.push(&Observation { starts_sequence: index % 12 == 0, degree: Some(2), ..observation });
             let entry = record.get(index).unwrap();
             beam.grow(&prices, &record, (index, entry), WANTED, false);
             check(&beam);

@@ -207,7 +207,7 @@ impl<const N: usize, const V: usize, const HISTORY: usize> RobustFilter<N, V, HI
             self.observed = self.observed.wrapping_add(1);
             return Update { place_index, ..Update::NONE };
         }
-        observation.begins |= self.record.is_empty();
+        observation.starts_sequence |= self.record.is_empty();
         if self.record.is_full() {
             self.faults.record(FaultKind::HistoryFull);
             let record = &self.record;

@@ -124,7 +124,7 @@ pub(crate) fn packed(observation: &Observation) -> Entry {
         Some(Turn::On) => TURN_ON,
     };
     let degree = observation.degree.unwrap_or(0).min(DEGREE_MAX);
-    let begins = if observation.begins { BEGINS } else { 0 };
+    let begins = if observation.starts_sequence { BEGINS } else { 0 };
     Entry {
         steps: observation.fingerprint.steps().min(Fingerprint::MAX.steps()),
         hints: turn | degree << DEGREE_SHIFT | begins,
@@ -144,7 +144,7 @@ mod tests {
                 for begins in [false, true] {
                     let fingerprint = Fingerprint::from_steps(steps).unwrap();
                     record.clear();
-                    record.push(&Observation { fingerprint, turn, degree, begins });
+                    record.push(&Observation { fingerprint, turn, degree, starts_sequence: begins });
                     let entry = record.get(0).unwrap();
                     assert_eq!((entry.steps, entry.turn()), (steps, turn));
                     assert_eq!((entry.degree(), entry.begins()), (kept, begins));

@@ -1,12 +1,12 @@
-//! A snapshot: what a robot has learned, as one byte string for a flash or a line (`docs/snapshot.md` is the specification).
+//! Snapshots: the state of a robot as one byte string. `docs/snapshot.md` is the specification.
 //!
 //! ```text
 //! magic "TSLM" | version u16 | length u32 | sections … | CRC-32
 //!                                           tag u8 | length u32 | contents
 //! ```
 //!
-//! All numbers are little endian, floats are their bits, and the length is that of the whole. A section that a reader does not
-//! know is skipped. Each stage writes and reads its own section; the filter's takes all the room that is left, so it comes last.
+//! All numbers are little endian, floats are their bits, and the length is that of the whole snapshot. A reader skips unknown
+//! sections. Each [stage](super::Persist) has one section. The filter's uses all the remaining room, so it is the last one.
 //!
 //! ```
 //! use toposlam::persist::snapshot::{Snapshot, Writer};
@@ -34,7 +34,7 @@ pub use writer::Writer;
 use crate::checksum::CRC;
 use core::fmt;
 
-/// The version of the layout; a snapshot of another one is refused.
+/// The version of the layout. A snapshot of another version is refused.
 pub const SNAPSHOT_VERSION: u16 = 1;
 
 /// The tag of the filter's section.
@@ -42,7 +42,7 @@ pub const FILTER_SECTION: u8 = 1;
 /// The tag of the drive's section.
 pub const DRIVE_SECTION: u8 = 2;
 
-/// What every snapshot begins with.
+/// The first bytes of every snapshot.
 const MAGIC: [u8; 4] = *b"TSLM";
 
 /// Magic, version and length.
@@ -51,7 +51,7 @@ const HEADER_BYTES: usize = 10;
 const SECTION_HEADER_BYTES: usize = 5;
 const CRC_BYTES: usize = 4;
 
-/// What a snapshot with one section takes beside the contents of the section.
+/// The length of a snapshot with one section, without the contents of the section.
 pub(crate) const FRAME_BYTES: usize = HEADER_BYTES + SECTION_HEADER_BYTES + CRC_BYTES;
 
 /// Why a snapshot could not be written or read.
@@ -60,18 +60,18 @@ pub(crate) const FRAME_BYTES: usize = HEADER_BYTES + SECTION_HEADER_BYTES + CRC_
 pub enum SnapshotError {
     /// The buffer has no room for it.
     Full,
-    /// Bytes are missing at its end.
+    /// The snapshot is cut short.
     TooShort,
-    /// It is not a snapshot, or its CRC is wrong.
+    /// The bytes are not a snapshot, or the CRC is wrong.
     Corrupt,
-    /// It has another version of the layout.
+    /// The snapshot has another version of the layout.
     Version {
-        /// The version it has.
+        /// The version of the snapshot.
         found: u16,
     },
-    /// It is of a filter of another kind or with other capacities.
+    /// The snapshot is of another kind of filter, or of other capacities.
     Capacities,
-    /// It says something that no filter says.
+    /// The contents are invalid.
     Contents,
 }
 
@@ -80,30 +80,30 @@ impl fmt::Display for SnapshotError {
         match self {
             Self::Full => f.write_str("the buffer has no room for a snapshot"),
             Self::TooShort => f.write_str("the snapshot is cut short"),
-            Self::Corrupt => f.write_str("the bytes are no snapshot, or its CRC is wrong"),
+            Self::Corrupt => f.write_str("the bytes are not a snapshot, or the CRC is wrong"),
             Self::Version { found } => write!(f, "the snapshot has version {found}, not {SNAPSHOT_VERSION}"),
             Self::Capacities => f.write_str("the snapshot is of a filter with other capacities"),
-            Self::Contents => f.write_str("the snapshot says what no filter says"),
+            Self::Contents => f.write_str("the contents of the snapshot are invalid"),
         }
     }
 }
 
 impl core::error::Error for SnapshotError {}
 
-/// Where the robot is when it goes on with a snapshot.
+/// Where the robot is when a snapshot is restored.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Resume {
-    /// Where it was when the snapshot was made: the next place follows the last one.
+    /// Where it was when the snapshot was taken: the next place is a neighbour of the last one.
     InPlace,
-    /// Anywhere: it may have been carried or driven since, so that the next place begins a sequence.
+    /// At an unknown vertex: it may have been moved since. The next place starts a sequence.
     AtUnknownVertex,
 }
 
-/// When snapshots are made.
+/// When snapshots are stored.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub struct SnapshotPolicy {
-    /// A snapshot with every so many places; 0 for none at all. Default 25.
+    /// A snapshot is stored every this many places; 0 for never. Default 25.
     pub every_places: u16,
 }
 
@@ -115,7 +115,7 @@ impl SnapshotPolicy {
     /// The defaults.
     pub const DEFAULT: Self = Self { every_places: 25 };
 
-    /// Whether one is due after the place of this number, counted from 0.
+    /// Whether a snapshot is due after the place of this number, counted from 0.
     pub const fn is_due(&self, place_index: u32) -> bool {
         match place_index.wrapping_add(1).checked_rem(self.every_places as u32) {
             Some(rest) => rest == 0,

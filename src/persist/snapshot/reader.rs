@@ -3,7 +3,7 @@
 use super::{CRC, CRC_BYTES, HEADER_BYTES, MAGIC, SNAPSHOT_VERSION, SnapshotError};
 use crate::persist::Persist;
 
-/// A snapshot whose CRC and version are right.
+/// A snapshot with a valid CRC and version.
 #[derive(Clone, Copy, Debug)]
 pub struct Snapshot<'a> {
     sections: Reader<'a>,
@@ -11,11 +11,11 @@ pub struct Snapshot<'a> {
 }
 
 impl<'a> Snapshot<'a> {
-    /// Opens a snapshot; what lies behind it in `bytes` does not matter.
+    /// Opens a snapshot; bytes after its end are ignored.
     ///
     /// # Errors
     /// [`SnapshotError::TooShort`], [`SnapshotError::Corrupt`], [`SnapshotError::Version`], or [`SnapshotError::Contents`]
-    /// when the lengths of the sections are not those of the whole.
+    /// if the lengths of the sections do not match the length of the snapshot.
     #[inline(never)]
     pub fn open(bytes: &'a [u8]) -> Result<Self, SnapshotError> {
         let mut header = Reader { bytes };
@@ -84,7 +84,7 @@ impl<'a> Reader<'a> {
     /// Reads some bytes.
     ///
     /// # Errors
-    /// [`SnapshotError::TooShort`] when there are not so many left.
+    /// [`SnapshotError::TooShort`] if fewer are left.
     #[inline(never)]
     pub fn bytes(&mut self, count: usize) -> Result<&'a [u8], SnapshotError> {
         let (read, rest) = self.bytes.split_at_checked(count).ok_or(SnapshotError::TooShort)?;
@@ -133,7 +133,7 @@ impl<'a> Reader<'a> {
         self.array().map(u64::from_le_bytes)
     }
 
-    /// Reads a float by its bits; it may be any, and none at all.
+    /// Reads a float by its bits; it may be infinite or not a number.
     ///
     /// # Errors
     /// As [`Reader::bytes`].
@@ -141,10 +141,10 @@ impl<'a> Reader<'a> {
         self.u32().map(f32::from_bits)
     }
 
-    /// Says that everything was read.
+    /// Checks that everything was read.
     ///
     /// # Errors
-    /// [`SnapshotError::Contents`] when something is left.
+    /// [`SnapshotError::Contents`] if bytes are left.
     pub fn finish(&self) -> Result<(), SnapshotError> {
         if self.bytes.is_empty() { Ok(()) } else { Err(SnapshotError::Contents) }
     }

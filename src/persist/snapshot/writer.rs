@@ -11,7 +11,7 @@ pub struct Writer<'a> {
 }
 
 impl<'a> Writer<'a> {
-    /// Begins a snapshot.
+    /// Starts a snapshot.
     ///
     /// # Errors
     /// [`SnapshotError::Full`] when the buffer has no room for one without sections.
@@ -24,10 +24,10 @@ impl<'a> Writer<'a> {
         Ok(writer)
     }
 
-    /// Writes a section. When that fails, the section is left out and the snapshot can go on.
+    /// Writes a section. When that fails, the section is left out and more sections can follow.
     ///
     /// # Errors
-    /// What `contents` gives; [`SnapshotError::Full`] when there is no room.
+    /// Errors of `contents`; [`SnapshotError::Full`] if there is no room.
     pub fn section(
         &mut self,
         tag: u8,
@@ -64,10 +64,10 @@ impl<'a> Writer<'a> {
         Ok(())
     }
 
-    /// Closes the snapshot and tells how many bytes it has.
+    /// Finishes the snapshot and returns its length in bytes.
     ///
     /// # Errors
-    /// None for a snapshot that was begun; the type leaves room for the slice arithmetic.
+    /// None; the `Result` is for the slice arithmetic.
     pub fn finish(mut self) -> Result<usize, SnapshotError> {
         let length = self.len + CRC_BYTES;
         self.overwrite(HEADER_BYTES - 4, &(length as u32).to_le_bytes());

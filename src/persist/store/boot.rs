@@ -1,49 +1,50 @@
-//! What a robot does with the snapshots in its store when it starts.
+//! Restores a snapshot of the store at the start.
 
 use embedded_storage::nor_flash::NorFlash;
 
 use super::{Store, StoreError, Stored};
 use crate::persist::snapshot::{Resume, SnapshotError};
 
-/// What a robot does with the newest snapshot when it starts.
+/// What the robot does with the newest snapshot at the start.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum BootPolicy {
-    /// It starts afresh; the snapshots stay until later ones take their room.
+    /// It starts with an empty map. The snapshots stay stored until later ones need their room.
     Fresh,
-    /// It goes on with the map, wherever it stands: it may have been carried while it was off. The default.
+    /// It restores the map, at an unknown vertex: it may have been moved while it was off. The default.
     #[default]
-    ContinueElsewhere,
-    /// It goes on where it was when the snapshot was made: for a robot that nobody moves, and that makes a snapshot whenever
-    /// it stops.
+    ContinueAtUnknownVertex,
+    /// It restores the map, where it was when the snapshot was taken. For a robot that is never moved and takes a snapshot
+    /// whenever it stops.
     ContinueInPlace,
 }
 
-/// Where the robot's map comes from.
+/// The origin of the robot's map.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum BootOutcome {
-    /// It has none, as it should.
+    /// The map is empty, as the policy says.
     Fresh,
-    /// It has none, for want of a snapshot that could be taken.
+    /// The map is empty, because no snapshot could be restored.
     Nothing,
-    /// It has that of a snapshot.
+    /// The map is that of a snapshot.
     Continued(Stored),
 }
 
-/// What a start found in the store.
+/// The result of [`resume`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct BootReport {
-    /// Where the map comes from.
+    /// The origin of the map.
     pub outcome: BootOutcome,
-    /// How many snapshots were passed over.
+    /// The number of snapshots that were rejected.
     pub rejected: u8,
-    /// Why the last of them was.
+    /// Why the last of them was rejected.
     pub why: Option<SnapshotError>,
-    /// What was wrong with the store, if anything.
+    /// The error of the store, if it failed.
     pub store: Option<StoreError>,
 }
 
-/// Goes on, as the policy says, with the newest snapshot that `restore` takes: one that is damaged, of another version or other
-/// capacities gives way to the one before. What is restored must have been started afresh, and stays so where nothing can be taken.
+/// Restores the newest snapshot that `restore` accepts, if the policy says so. After a damaged snapshot, or one of another
+/// version or other capacities, the previous one is tried. The stages must have been started before; they do not change if
+/// no snapshot is accepted.
 pub fn resume<FLASH: NorFlash>(
     store: &mut Store<FLASH>,
     buffer: &mut [u8],
@@ -53,7 +54,7 @@ pub fn resume<FLASH: NorFlash>(
     let mut report = BootReport { outcome: BootOutcome::Fresh, rejected: 0, why: None, store: None };
     let place = match policy {
         BootPolicy::Fresh => return report,
-        BootPolicy::ContinueElsewhere => Resume::AtUnknownVertex,
+        BootPolicy::ContinueAtUnknownVertex => Resume::AtUnknownVertex,
         BootPolicy::ContinueInPlace => Resume::InPlace,
     };
     report.outcome = BootOutcome::Nothing;

@@ -1,9 +1,9 @@
 //! Snapshots in flash: wear-levelled, and safe against a power cut at any time.
 //!
-//! The range of flash is two halves. What is stored goes behind what one half has already, and only when that is full the
-//! other half is erased and goes on. **The half with the newest complete snapshot is never erased**, so a power cut loses at
-//! most the snapshot that was being stored, whatever state it leaves the flash in. Each half is a queue of the crate
-//! `sequential-storage`; a snapshot is in pieces of 249 bytes there, and counts when its last piece is there.
+//! The range of flash has two halves. Snapshots are appended to one half. When it is full, the other half is erased and used
+//! next. **The half with the newest complete snapshot is never erased**, so a power cut loses at most the snapshot that was
+//! being stored, whatever state the flash is left in. Each half is a queue of the crate `sequential-storage`. A snapshot is
+//! split into pieces of 249 bytes; it is valid once its last piece is written.
 //!
 //! ```
 //! # use embedded_storage::nor_flash::NorFlash;
@@ -38,27 +38,27 @@ use log::{Log, Push};
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum StoreError {
-    /// The range is not an even number of the flash's erasable units, or not in the flash, or the units are smaller than 512 bytes.
+    /// The range is not an even number of erasable units, or not in the flash, or the units are smaller than 512 bytes.
     Range,
     /// The flash reported an error.
     Flash(NorFlashErrorKind),
     /// The snapshot is larger than [`Store::largest`].
     TooLarge,
-    /// What was stored reads otherwise: the flash is worn out or damaged.
+    /// The stored bytes read back differently: the flash is worn out or damaged.
     Damaged,
-    /// The flash said that it is not ready, which a blocking one never does.
+    /// The flash was not ready, which a blocking flash never is.
     NotReady,
 }
 
 impl fmt::Display for StoreError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(match self {
-            Self::Range => "the range of flash is no even number of erasable units",
-            Self::Flash(NorFlashErrorKind::NotAligned) => "the flash wants another alignment",
+            Self::Range => "the range is not an even number of erasable units",
+            Self::Flash(NorFlashErrorKind::NotAligned) => "the alignment does not fit the flash",
             Self::Flash(NorFlashErrorKind::OutOfBounds) => "the range is beyond the flash",
             Self::Flash(_) => "the flash reported an error",
             Self::TooLarge => "the snapshot is larger than half of the range",
-            Self::Damaged => "the flash does not keep what is stored",
+            Self::Damaged => "the stored bytes read back differently",
             Self::NotReady => "the flash is not ready",
         })
     }
@@ -106,7 +106,7 @@ pub struct Store<FLASH> {
 }
 
 impl<FLASH: NorFlash> Store<FLASH> {
-    /// Looks through a range of flash for what was stored before. Erases a page that a power cut left half erased.
+    /// Mounts a range of flash and finds what is stored there. Erases a page that a power cut left partly erased.
     ///
     /// # Errors
     /// [`StoreError::Range`], [`StoreError::Flash`], [`StoreError::NotReady`].
@@ -154,7 +154,7 @@ impl<FLASH: NorFlash> Store<FLASH> {
     /// written; when a half is full, one erase.
     ///
     /// # Errors
-    /// [`StoreError`]; the snapshots before are still there.
+    /// [`StoreError`]; earlier snapshots are still stored.
     pub fn save(&mut self, snapshot: &[u8]) -> Result<(), StoreError> {
         if snapshot.len() > self.largest() {
             return Err(StoreError::TooLarge);
@@ -187,7 +187,7 @@ impl<FLASH: NorFlash> Store<FLASH> {
         self.newest_below(stored.serial, buffer)
     }
 
-    /// Counts a start of the robot, and tells how many there were.
+    /// Counts a start of the robot and returns the number of starts.
     ///
     /// The number is larger than at the start before, unless the power was cut between the erase of a half and its first
     /// write while the other half was full.
@@ -207,12 +207,12 @@ impl<FLASH: NorFlash> Store<FLASH> {
         Ok(self.starts)
     }
 
-    /// How many starts were counted.
+    /// The number of starts.
     pub fn starts(&self) -> u32 {
         self.starts
     }
 
-    /// Forgets all snapshots; the starts stay counted.
+    /// Erases all snapshots and keeps the number of starts.
     ///
     /// # Errors
     /// As [`Store::count_start`].
@@ -224,12 +224,12 @@ impl<FLASH: NorFlash> Store<FLASH> {
         Ok(())
     }
 
-    /// The flash. What is written to the store's range goes unnoticed until the store is mounted again.
+    /// The flash. The store does not notice writes to its range until it is mounted again.
     pub fn flash_mut(&mut self) -> &mut FLASH {
         &mut self.flash
     }
 
-    /// Gives the flash back.
+    /// Returns the flash.
     pub fn release(self) -> FLASH {
         self.flash
     }
@@ -244,7 +244,7 @@ impl<FLASH: NorFlash> Store<FLASH> {
         self.serial
     }
 
-    /// Looks through a half, for complete snapshots below a number.
+    /// Searches a half for complete snapshots below a serial number.
     #[inline(never)]
     fn survey(&mut self, half: usize, below: u32) -> Result<Survey, StoreError> {
         let mut survey = Survey::default();
@@ -288,7 +288,7 @@ impl<FLASH: NorFlash> Store<FLASH> {
         }
     }
 
-    /// Copies a snapshot; tells whether all of it was there.
+    /// Copies a snapshot; returns whether it is complete.
     #[inline(never)]
     fn read(&mut self, half: usize, stored: Stored, to: &mut [u8]) -> Result<bool, StoreError> {
         let mut is_complete = false;
@@ -306,9 +306,9 @@ impl<FLASH: NorFlash> Store<FLASH> {
         Ok(is_complete)
     }
 
-    /// Whether a snapshot reads as it should.
+    /// Whether a snapshot reads back as it was written.
     #[inline(never)]
-    fn is_kept(&mut self, half: usize, serial: u32, snapshot: &[u8]) -> Result<bool, StoreError> {
+    fn is_stored(&mut self, half: usize, serial: u32, snapshot: &[u8]) -> Result<bool, StoreError> {
         let mut is_same = true;
         let mut is_complete = false;
         let mut assembly = Assembly::NONE;
@@ -324,7 +324,7 @@ impl<FLASH: NorFlash> Store<FLASH> {
         Ok(is_same && is_complete)
     }
 
-    /// Stores a snapshot behind what a half has; tells whether it had room for it and keeps it.
+    /// Appends a snapshot to a half; returns whether it had room and reads back.
     #[inline(never)]
     fn append(&mut self, half: usize, snapshot: &[u8]) -> Result<bool, StoreError> {
         // The ends of pages waste some more: a snapshot may turn out not to fit.
@@ -343,7 +343,7 @@ impl<FLASH: NorFlash> Store<FLASH> {
             pieces = index + 1;
         }
         let end = Item::End { serial, pieces, length: snapshot.len() as u32 };
-        if self.push(half, &end)? == Push::Full || !self.is_kept(half, serial, snapshot)? {
+        if self.push(half, &end)? == Push::Full || !self.is_stored(half, serial, snapshot)? {
             return Ok(false);
         }
         self.newest = Some(half);

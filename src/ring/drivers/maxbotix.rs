@@ -124,7 +124,7 @@ mod tests {
     }
 
     #[test]
-    fn the_configuration_names_the_field_that_cannot_be() {
+    fn each_field_out_of_its_range_is_named() {
         let good = MaxBotixConfig::<16>::DEFAULT;
         for first_address in [0x08, 0x18, 0x29, 0x42, 0x56, 0x70] {
             assert_eq!(MaxBotixConfig { first_address, ..good }.check(), Ok(()), "{first_address:#x}");

@@ -167,7 +167,7 @@ mod tests {
     }
 
     #[test]
-    fn the_configuration_names_the_field_that_cannot_be() {
+    fn each_field_out_of_its_range_is_named() {
         let good = Srf08Config::<16>::DEFAULT;
         assert_eq!(good.check(), Ok(()));
         let wrong = [
