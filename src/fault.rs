@@ -31,7 +31,7 @@ pub enum FaultKind {
     NgramsFull = 6,
     /// The history is full: the oldest place was dropped.
     HistoryFull = 7,
-    /// The transmit queue was full: a message was dropped (the rolling picture makes up for it).
+    /// The transmit queue was full: a message was dropped. The repeated map makes up for it.
     WireFull = 8,
     /// A frame on the serial line was corrupt, cut or foreign.
     WireCorrupt = 9,

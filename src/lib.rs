@@ -1,24 +1,25 @@
 //! Topological SLAM that fits in a microcontroller.
 //!
-//! A robot with a ring of cheap sonars, without odometry or camera, drives through corridors that look alike and
-//! builds the map of places and connections on its own. Data flows one way, and every stage is usable alone:
+//! A robot with a ring of range sensors, without odometry or camera, explores corridors that look alike and builds a graph of
+//! places. Data flows one way, and each stage is a module that can be used alone:
 //!
 //! ```text
-//! ring frame ─▶ place ─▶ hypotheses ─▶ map update ─▶ wire
-//! (sonar, ring) (place)  (filter)      (filter)      (wire)
+//! ring frame ─▶ place ─▶ hypotheses ─▶ map update ─▶ messages
+//! (ring)        (place)  (filter)      (map)         (wire)
+//!              └────────── Mapper ──────────┘
+//! └───────────────────────── Robot ────────────────────────┘
 //! ```
 //!
-//! The crate never allocates and holds no unsafe code. Capacities are const generics, big state is const-constructed
-//! (so a `static` of it lies in `.bss`) and initialised in place.
+//! The crate never allocates and has no unsafe code. Capacities are const generics. Large state is const-constructed, so that
+//! a `static` of it is in `.bss`, and initialised in place.
 //!
 //! # From ring frames to a map
 //!
 //! ```
-//! use toposlam::place::{PlaceConfig, PlaceDetector};
 //! use toposlam::ring::{Echo, RingFrame, RingGeometry};
-//! use toposlam::{Observation, RobustConfig, RobustFilter};
+//! use toposlam::{Mapper, MapperConfig, RobustFilter};
 //!
-//! /// What a ring of 16 sonars hears in a corridor that ends ahead.
+//! /// The frame of a ring of 16 sensors in a corridor that ends ahead.
 //! fn frame(half_width_mm: u16, ahead_mm: u16) -> RingFrame<16> {
 //!     let mut echoes = [Echo::Silence; 16];
 //!     for (sensor, range_mm) in [(0, ahead_mm), (4, half_width_mm), (12, half_width_mm)] {
@@ -27,35 +28,31 @@
 //!     RingFrame { echoes }
 //! }
 //!
-//! let mut detector = PlaceDetector::<16>::new();
-//! detector.start(PlaceConfig::DEFAULT, RingGeometry::even())?;
-//! let mut filter = RobustFilter::<10, 16, 400>::new();
-//! filter.start(RobustConfig::DEFAULT, 1)?;
+//! let mut mapper = Mapper::<16, 16, RobustFilter<10, 16, 400>>::new();
+//! mapper.start(&MapperConfig::for_ring(RingGeometry::even()))?;
 //!
 //! // To and fro between the ends of a corridor that is 1.6 m wide at one end and 2.4 m at the other.
 //! for half_width_mm in [800, 1200, 800, 1200, 800] {
 //!     for step in -50_i16..=50 {
 //!         let ahead_mm = half_width_mm + 30 * step.unsigned_abs();
-//!         if let Some(place) = detector.observe(&frame(half_width_mm, ahead_mm)) {
-//!             let degree = place.degree;
-//!             let update = filter.observe(Observation { degree, ..Observation::new(place.fingerprint) });
+//!         if let Some((place, update)) = mapper.observe(&frame(half_width_mm, ahead_mm), None) {
 //!             println!("{} mm: vertex {}", place.fingerprint.radius_mm(), update.vertex);
 //!         }
 //!     }
 //! }
-//! assert_eq!(filter.observed(), 5);
-//! let [a, b] = filter.map().vertices().collect::<Vec<_>>()[..] else { panic!("two vertices") };
-//! assert!(filter.map().edges().eq([(a, b)]));
-//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! assert_eq!(mapper.filter().observed(), 5);
+//! let [a, b] = mapper.map().vertices().collect::<Vec<_>>()[..] else { panic!("two vertices") };
+//! assert!(mapper.map().edges().eq([(a, b)]));
+//! # Ok::<(), toposlam::ConfigError>(())
 //! ```
 //!
-//! [`Mapper`] is these stages in one piece, with the refinement of the map between two places. It takes either filter, or
-//! another one that is a [`Filter`]. The feature `wire` adds the `Reporter`, which sends what the mapper found, and the whole
-//! `Robot`.
+//! [`Mapper`] is a place detector and a filter, with the refinement of the map between two places. It takes either filter, or
+//! another [`Filter`]. The feature `wire` adds the `Reporter`, which sends the results of the mapper, and the whole `Robot`.
+//! The examples of the crate show a filter alone, a ring of one's own, recorded ring frames, and a whole robot.
 //!
-//! # How well a map fits
+//! # Consistency of a map
 //!
-//! [`Consistency`] is the measure of Eq. 2 on its own, for any [`Map`] and any [`History`] or [`NgramTable`]:
+//! [`Consistency`] computes the measure of Eq. 2 for any [`Map`] and any [`History`] or [`NgramTable`]:
 //!
 //! ```
 //! use toposlam::{Consistency, Direction, Fingerprint, History, Map, NgramLength};
@@ -70,7 +67,7 @@
 //! let length = NgramLength::new(5)?;
 //! let mut consistency = Consistency::<2, 1, 1>::new();
 //! assert_eq!(consistency.distance_steps(&map, &history, length, Direction::TwoSided), Some(0));
-//! // The robot finds a place that the map does not have, 100 mm wider than the one it has.
+//! // The robot visits a place that the map does not have, 100 mm wider than the widest one of the map.
 //! history.push(Fingerprint::from_radius_mm(1300)?);
 //! let distance = consistency.distance_steps(&map, &history, length, Direction::TwoSided);
 //! assert_eq!(distance.map(|steps| steps * length.label_step_mm()), Some(100));
@@ -82,41 +79,40 @@
 //! | Feature | Adds |
 //! |---|---|
 //! | none | detector, filters, [`Mapper`], drive, drivers of the sonars |
-//! | `snapshot` | snapshots of the map and the filter as byte strings (module `snapshot`) |
-//! | `store` | snapshots in flash, wear-levelled (module `store`) |
+//! | `snapshot` | snapshots of the stages as byte strings (module `persist::snapshot`) |
+//! | `store` | snapshots in flash, wear-levelled (module `persist::store`); implies `snapshot` |
 //! | `wire` | the serial protocol (module `wire`) and the whole robot (module `robot`); implies `snapshot` |
-//! | `defmt` | `defmt::Format` for what a firmware logs |
-//! | `firmware`, `pll` | the images in `src/bin`; only for the reference board's target |
+//! | `defmt` | `defmt::Format` for the types that a firmware logs |
+//! | `firmware`, `pll` | the images in `src/bin`; only for the target of the reference board |
 //!
 //! # Capacities and memory
 //!
-//! | Parameter | Means | Range | Reference robot |
+//! | Parameter | Meaning | Range | Reference robot |
 //! |---|---|---|---|
 //! | `SONARS` | sensors of the ring | 3 to 128 | 16 |
 //! | `N` | hypotheses, or particles | 1 to 255 | 10 |
-//! | `HISTORY` of a [`RobustFilter`] | places that moves can still explain in another way | 8 to 16384 | 400 |
+//! | `HISTORY` of a [`RobustFilter`] | places that repair moves can reassign | 8 to 16384 | 400 |
 //! | `V` | vertices of a map | 1 to 64; 2 to 32 for the robust filter | 16 |
 //! | `WORDS` of a [`History`] | 32 places each, for the paper's filter | powers of two | none |
-//! | `WORDS` of an [`NgramTable`] or [`Prior`] | 16 n-grams each | even numbers up to 1024 | none: it maps on line |
+//! | `WORDS` of an [`NgramTable`] or [`Prior`] | 16 n-grams each | even numbers up to 1024 | none |
 //!
-//! Each type states its size as a function of these. [`mod@reference`] has the capacities of the reference robot. What does
-//! not fit is counted as a [`FaultKind`], and the map so far stays; the oldest places of a full history make room.
+//! Each type documents its size as a function of these. [`mod@reference`] has the capacities of the reference robot. A full
+//! table is counted as a [`FaultKind`], and the map stays. A full history drops its oldest places.
 //!
 //! # Determinism
 //!
-//! The same input, configuration and seed give the same result, bit for bit, on every target: the paper's weights are sums of
-//! integer logarithms, the robust filter's evidence is computed in single precision with the operations of IEEE 754 in a fixed
-//! order, the random draws of a place are a function of the seed and the number of the place, and where an exponential
-//! or a logarithm is needed, `libm` computes it in software. `toposlam emulate` holds the firmware to a host:
-//! the location at every place, and the whole map at the end.
+//! The same input, configuration and seed give the same result, bit for bit, on every target. The weights of the paper's filter
+//! are sums of integer logarithms. The evidence of the robust filter is computed in single precision with the operations of
+//! IEEE 754 in a fixed order. Random draws are a function of the seed and the number of the place. `libm` computes exponentials
+//! and logarithms in software. `toposlam emulate` compares the firmware with a host: the location at every place, and the
+//! whole map at the end.
 //!
-//! # Where the paper is
+//! # The paper
 //!
-//! [`RobustFilter`], the default, goes beyond the paper; `docs/inference.md` describes it. [`PaperFilter`] is the paper's. Both are a
-//! [`Filter`].
+//! [`PaperFilter`] is the filter of the paper. [`RobustFilter`], the default, goes beyond it; `docs/inference.md` describes it.
 //!
 //! F. Werner, F. Maire, J. Sitte, H. Choset, S. Tully, G. Kantor: *Topological SLAM using Neighbourhood Information of
-//! Places*. All numbers of equations, definitions and sections are its own.
+//! Places*. All numbers of equations, definitions and sections refer to it.
 //!
 //! | Paper | File |
 //! |---|---|

@@ -1,6 +1,6 @@
-//! The reference robot: the capacities and settings that its firmware, the bench and a host's repetition of a run share.
+//! The reference robot: the capacities and settings of its firmware, of the bench, and of repetitions of a run on a host.
 //!
-//! A host that feeds the same frames into the same stages gets the same map, bit for bit.
+//! The same frames give the same map on a host and on the robot, bit for bit.
 //!
 //! ```
 //! use toposlam::place::PlaceDetector;
@@ -9,7 +9,7 @@
 //!
 //! let mut detector: reference::Detector = PlaceDetector::new();
 //! detector.start(reference::PLACE, RingGeometry::even())?;
-//! // Silence all around is no place.
+//! // A frame without echoes is not a place.
 //! assert!(detector.observe(&RingFrame { echoes: [Echo::Silence; SONARS] }).is_none());
 //! # Ok::<(), toposlam::ConfigError>(())
 //! ```
@@ -21,7 +21,7 @@ use crate::{
     place::PlaceDetector, ring::RingGeometry,
 };
 
-/// Sonars in the ring.
+/// The number of sensors in the ring.
 pub const SONARS: usize = 16;
 /// The most hypotheses.
 pub const HYPOTHESES: usize = 10;
@@ -32,21 +32,21 @@ pub const HISTORY: usize = 400;
 /// The seed of the filter's draws.
 pub const SEED: u64 = 1;
 
-/// Sixteen sonars 22.5° apart, counter-clockwise, the first straight ahead.
+/// Sixteen sensors 22.5° apart, counter-clockwise from straight ahead.
 pub const RING: RingGeometry<SONARS> = RingGeometry::even();
-/// The detector's settings.
+/// The settings of the place detector.
 ///
-/// A robot that drives itself stands at a meet point until the place is reported; it need not stand so long as one that
-/// somebody else has parked.
+/// A robot that drives itself stands at a meet point until the place is reported. So `settle_frames` is shorter than the
+/// default, which suits a robot that is driven by hand.
 pub const PLACE: PlaceConfig = PlaceConfig { settle_frames: 15, ..PlaceConfig::DEFAULT };
-/// The filter's settings.
+/// The settings of the filter.
 pub const FILTER: RobustConfig = RobustConfig::DEFAULT;
 
-/// The buffer for a snapshot, in bytes.
+/// The size of the buffer for snapshots in bytes.
 #[cfg(feature = "snapshot")]
 pub const SNAPSHOT_BYTES: usize = 8 * 1024;
 
-/// Where its flash keeps snapshots: the last two sectors of 128 KiB of 1 MiB, as offsets.
+/// The range of flash for snapshots: the last two sectors of 128 KiB of 1 MiB, as offsets.
 #[cfg(feature = "store")]
 pub const STORE: core::ops::Range<u32> = 0xC_0000..0x10_0000;
 
@@ -54,28 +54,28 @@ pub const STORE: core::ops::Range<u32> = 0xC_0000..0x10_0000;
 pub type Detector = PlaceDetector<SONARS>;
 /// The filter of the reference robot.
 pub type Filter = RobustFilter<HYPOTHESES, VERTICES, HISTORY>;
-/// All stages of the reference robot in one.
+/// The mapper of the reference robot.
 pub type RobotMapper = Mapper<SONARS, VERTICES, Filter>;
-/// The settings of all stages of the reference robot.
+/// The settings of the mapper.
 pub const MAPPER: MapperConfig<SONARS, RobustConfig> =
     MapperConfig { geometry: RING, place: PLACE, filter: FILTER, seed: SEED };
 
-/// The whole robot: all stages, the drive and its commands.
+/// The reference robot.
 #[cfg(feature = "wire")]
 pub type ReferenceRobot<'buffer> = Robot<'buffer, SONARS, HYPOTHESES, VERTICES, HISTORY>;
-/// The settings of the whole robot.
+/// The settings of the reference robot.
 #[cfg(feature = "wire")]
 pub const ROBOT: RobotConfig<SONARS> = RobotConfig::for_ring(RING);
 
-/// The most particles of the paper's filter, where it stands in for the reference robot's.
+/// The most particles of the paper's filter in place of the robust one.
 pub const PAPER_PARTICLES: usize = 10;
-/// Words of its history: 32 observations each, so 256.
+/// Words of its history, 32 observations each: 256 observations.
 pub const PAPER_HISTORY_WORDS: usize = 8;
-/// The settings of the paper's filter: the defaults, with the half of Eq. 2 that asks whether the map explains what was
-/// observed. On line the other half blames the map for what the robot has not driven yet, and costs several times as much
+/// The settings of the paper's filter: the defaults, with the half of Eq. 2 from the history to the map. While the robot
+/// explores, the other half penalises the map for corridors that were not driven yet; it also costs several times as much
 /// (`docs/costs.md`).
 pub const PAPER_FILTER: Config = Config { direction: Direction::HistoryToMap, ..Config::DEFAULT };
-/// The paper's filter in the place of the reference robot's.
+/// The paper's filter in place of the robust one.
 pub type PaperReference = PaperFilter<PAPER_PARTICLES, VERTICES, PAPER_HISTORY_WORDS>;
 
 #[cfg(feature = "snapshot")]

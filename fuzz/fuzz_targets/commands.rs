@@ -281,7 +281,7 @@ impl<'buffer> Robot<'buffer> {
             taken?;
             self.expected.staged = Staged::Outgoing;
         }
-        let piece = self.staging.piece(offset);
+        let piece = self.staging.outgoing_chunk(offset);
         match (&piece, &self.expected.staged) {
             (Ok(Outcome::Snapshot { total, offset: at, bytes }), Staged::Outgoing) => {
                 let rest = usize::from(total - offset);

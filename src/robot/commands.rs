@@ -36,7 +36,7 @@ impl<const SONARS: usize, const N: usize, const V: usize, const HISTORY: usize> 
                     let Self { mapper, drive, staging, .. } = self;
                     staging.take(|buffer| snapshot(mapper, drive, buffer).ok())?;
                 }
-                return self.staging.piece(offset);
+                return self.staging.outgoing_chunk(offset);
             }
             Command::RestoreBegin { length, crc } => self.staging.begin(length, crc)?,
             Command::RestoreChunk { offset, bytes } => self.staging.chunk(offset, bytes.as_slice())?,

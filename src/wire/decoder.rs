@@ -1,4 +1,4 @@
-//! Bytes to messages: a push decoder that takes whatever the line delivers.
+//! A push decoder: bytes in pieces of any length become messages.
 
 use core::fmt;
 use core::marker::PhantomData;
@@ -7,25 +7,25 @@ use super::frame::{CRC_BYTES, HEADER_BYTES, MAX_RAW_BYTES};
 use super::{Message, Payload};
 use crate::checksum::CRC;
 
-/// What came of the bytes that were fed.
+/// The result of feeding bytes to a decoder.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Progress<'bytes, M = Message> {
-    /// All bytes are taken and no frame is complete yet.
+    /// All bytes are consumed; no frame is complete.
     NeedsMore,
     /// One message is complete.
     Message {
-        /// The number of its frame and how it follows on the frames before.
+        /// The header of its frame.
         header: Header,
         /// The message.
         message: M,
-        /// The bytes that were not read yet: feed them next.
+        /// The bytes that were not consumed: feed them next.
         rest: &'bytes [u8],
     },
-    /// What lay between two zeros was no message; it was counted and dropped.
+    /// The bytes between two zeros were not a message. They were counted and dropped.
     Error {
         /// What was wrong.
         error: DecodeError,
-        /// The bytes that were not read yet: feed them next.
+        /// The bytes that were not consumed: feed them next.
         rest: &'bytes [u8],
     },
 }
@@ -35,32 +35,32 @@ pub enum Progress<'bytes, M = Message> {
 pub struct Header {
     /// The number of the frame.
     pub sequence: u16,
-    /// How the frame follows on those before.
+    /// How the number follows on the previous ones.
     pub arrival: Arrival,
 }
 
-/// How a frame follows on those before.
+/// How the number of a frame follows on the previous ones.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Arrival {
     /// The first intact frame.
     First,
-    /// The one that was due.
+    /// The next number.
     InOrder,
-    /// Frames in between are missing.
+    /// Frames are missing before this one.
     AfterGap {
-        /// How many.
+        /// The number of missing frames.
         lost: u16,
     },
-    /// One of the last 64 numbers again: the frame was repeated or overtaken.
+    /// One of the last 64 numbers: the frame was repeated or overtaken.
     Late,
-    /// The sender has started anew.
+    /// The sender has restarted.
     Restart,
 }
 
-/// What a decoder has seen since it was made; every count saturates.
+/// The counts of a decoder; every count saturates.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct DecoderCounters {
-    /// Messages that were handed out.
+    /// Decoded messages.
     pub messages: u32,
     /// Frames that are missing according to the sequence numbers (a frame that arrived corrupt is one of them).
     pub lost: u32,
@@ -72,15 +72,15 @@ pub struct DecoderCounters {
     pub too_long: u32,
     /// Intact frames of another frame version.
     pub unknown_version: u32,
-    /// Intact frames whose payload is none of the messages known here.
+    /// Intact frames with an unknown message.
     pub unknown_message: u32,
 }
 
-/// Takes the bytes of the serial line in pieces of any length and hands out the messages; on the robot, the
+/// Decodes the bytes of a serial line, in pieces of any length, into messages; on the robot, into
 /// [`Request`](super::Request)s.
 ///
-/// It never blocks and never reads beyond the frame that it hands out. Whatever goes wrong inside a frame, the next
-/// zero byte ends it, and the frame after is read as if nothing had happened. Memory: 160 bytes.
+/// It never blocks and never reads beyond a complete frame. The next zero byte ends every frame, whatever is wrong inside it,
+/// so that damage never spreads beyond a frame and its neighbour. Memory: 160 bytes.
 ///
 /// ```
 /// use toposlam::wire::{Decoder, Encoder, MAX_FRAME_BYTES, Message, Progress};
@@ -122,7 +122,7 @@ impl<M: Payload> Decoder<M> {
     /// Numbers that lie at most so far back are late frames, not a restart.
     const LATE_WINDOW: u16 = 64;
 
-    /// A decoder that has seen nothing.
+    /// A decoder without input.
     pub const fn new() -> Self {
         Self {
             raw: [0; MAX_RAW_BYTES],
@@ -145,12 +145,12 @@ impl<M: Payload> Decoder<M> {
         }
     }
 
-    /// What was seen so far.
+    /// The counts so far.
     pub const fn counters(&self) -> DecoderCounters {
         self.counters
     }
 
-    /// Takes bytes up to the end of the next frame. Call again with the rest until it says [`Progress::NeedsMore`].
+    /// Consumes bytes up to the end of the next frame. Call it with the rest until it returns [`Progress::NeedsMore`].
     pub fn feed<'bytes>(&mut self, bytes: &'bytes [u8]) -> Progress<'bytes, M> {
         let mut rest = bytes;
         while let Some((&byte, tail)) = rest.split_first() {
@@ -210,7 +210,7 @@ impl<M: Payload> Decoder<M> {
         }
     }
 
-    /// Judges what lies between two zeros: the sequence number and the message, unless it is one that is not known here.
+    /// Decodes the bytes between two zeros: the sequence number, and the message if it is known.
     fn finish(&self) -> Result<(u16, Option<M>), DecodeError> {
         if self.too_long {
             return Err(DecodeError::TooLong);
@@ -238,8 +238,8 @@ impl<M: Payload> Decoder<M> {
         }
     }
 
-    /// Lets an unknown message count as received, so that a newer sender's do not look like lost frames. After a gap the
-    /// number stays as it was: the next message has to tell of the gap.
+    /// Counts an unknown message as received, so that the messages of a newer sender do not look like lost frames. After a gap
+    /// the number stays: the next known message reports the gap.
     fn pass_over(&mut self, sequence: u16) {
         if self.last_sequence.is_some_and(|last| last.wrapping_add(1) == sequence) {
             self.last_sequence = Some(sequence);
@@ -294,7 +294,7 @@ fn bump(count: &mut u32, by: u32) {
     *count = count.saturating_add(by);
 }
 
-/// Why the bytes between two zeros are no message.
+/// Why the bytes between two zeros are not a message.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum DecodeError {
@@ -304,12 +304,12 @@ pub enum DecodeError {
     Cut,
     /// The frame is longer than any message.
     TooLong,
-    /// The frame is intact and has a version that is not known here.
+    /// The frame is intact and has an unknown version.
     UnknownVersion {
         /// The version of the frame.
         version: u8,
     },
-    /// The frame is intact and its payload is none of the messages known here (the sender may be newer).
+    /// The frame is intact and holds an unknown message; the sender may be newer.
     UnknownMessage,
 }
 

@@ -9,7 +9,7 @@ pub fn crc32(bytes: &[u8]) -> u32 {
     CRC.checksum(bytes)
 }
 
-/// The digest of a map: CRC-32 ISO-HDLC of its canonical bytes, by which a listener tells that it has the same map.
+/// The digest of a map: the CRC-32 ISO-HDLC of its canonical bytes. A listener compares it with that of its replica.
 ///
 /// The canonical bytes are the number of vertices (`u8`) and, for each vertex in order, the radius in millimetres
 /// (`u16`), the number of visits (`u32`) and the neighbours (`u64`, bit `w` for vertex `w`), all little endian. Two
@@ -18,7 +18,7 @@ pub fn map_digest<const V: usize>(map: &Map<V>) -> u32 {
     rows_digest(map.vertices().len() as u8, map.vertices().map(|vertex| row_of(map, vertex)))
 }
 
-/// The digest of a map that is given as its rows.
+/// The digest of a map, from its rows.
 pub(super) fn rows_digest(vertices: u8, rows: impl Iterator<Item = Row>) -> u32 {
     let mut digest = CRC.digest();
     digest.update(&[vertices]);

@@ -1,12 +1,12 @@
-//! Messages and requests to frames: COBS( version | sequence | postcard payload | CRC-32 ) and a closing zero.
+//! Encodes messages and requests as frames: COBS( version | sequence | postcard payload | CRC-32 ) and a closing zero.
 
 use core::fmt;
 
 use super::{Echoes, Payload};
 use crate::checksum::CRC;
 
-/// The version of the frame layout and of everything that could break an old listener; the first byte of every frame. In a
-/// frame to the robot its top bit is set, so that a line that echoes what the robot says gives no commands.
+/// The version of the frames, raised by every change that breaks old listeners; the first byte of every frame. In frames to
+/// the robot its top bit is set, so that an echoing line gives no commands.
 pub const FRAME_VERSION: u8 = 2;
 
 /// The version and the sequence number.
@@ -24,10 +24,10 @@ pub const MAX_FRAME_BYTES: usize = MAX_RAW_BYTES + 2;
 
 const _: () = assert!(MAX_RAW_BYTES < 254, "the short COBS here knows no block of 254 bytes");
 
-/// Packs messages, or requests, into frames and numbers them.
+/// Encodes messages or requests as numbered frames.
 ///
-/// A frame that the transmit queue then refuses keeps its number: the listener sees the gap and knows that it missed
-/// something. Send one zero byte before the first frame, so that noise from the start does not spoil it.
+/// A frame that the transmit queue refuses keeps its number, so that the listener detects the gap. Send one zero byte before
+/// the first frame, so that noise from the start does not corrupt it.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Encoder {
     sequence: u16,
@@ -39,13 +39,12 @@ impl Encoder {
         Self { sequence: first_sequence }
     }
 
-    /// Packs one message or request into `out` and returns the bytes of the frame, its closing zero included.
+    /// Encodes one message or request into `out` and returns the frame, closing zero included.
     ///
-    /// A buffer of [`MAX_FRAME_BYTES`] is always enough. Cost: linear in the length; the frame
-    /// before stuffing lies on the stack.
+    /// A buffer of [`MAX_FRAME_BYTES`] always suffices. Cost: linear in the length; the frame before COBS is on the stack.
     ///
     /// # Errors
-    /// [`EncodeError::OutputTooShort`] when the frame does not fit into `out`; no sequence number is used up.
+    /// [`EncodeError::OutputTooShort`] if the frame does not fit into `out`; the sequence number is not used up.
     pub fn encode<'out>(&mut self, message: &impl Payload, out: &'out mut [u8]) -> Result<&'out [u8], EncodeError> {
         let mut raw = [0; MAX_RAW_BYTES];
         let length = fill_raw(self.sequence, message, &mut raw).ok_or(EncodeError::MessageTooLong)?;
@@ -56,7 +55,7 @@ impl Encoder {
     }
 }
 
-/// Writes header, payload and CRC; returns how many bytes that took.
+/// Writes header, payload and CRC; returns their length.
 fn fill_raw<M: Payload>(sequence: u16, message: &M, raw: &mut [u8; MAX_RAW_BYTES]) -> Option<usize> {
     let [version, low, high, rest @ ..] = raw;
     *version = M::VERSION;
@@ -70,7 +69,7 @@ fn fill_raw<M: Payload>(sequence: u16, message: &M, raw: &mut [u8; MAX_RAW_BYTES
     Some(end + CRC_BYTES)
 }
 
-/// Stuffs fewer than 254 bytes so that none of them is zero, and closes with a zero; returns how many bytes that took.
+/// Encodes fewer than 254 bytes without zeros and appends a zero; returns the length.
 fn cobs(raw: &[u8], out: &mut [u8]) -> Option<usize> {
     let mut slots = out.iter_mut();
     let mut written = 0;
@@ -89,13 +88,13 @@ fn cobs(raw: &[u8], out: &mut [u8]) -> Option<usize> {
     Some(written)
 }
 
-/// Why a message was not packed.
+/// Why a message was not encoded.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum EncodeError {
     /// The output buffer is shorter than the frame.
     OutputTooShort,
-    /// The message is longer than any message of this protocol can be.
+    /// The message is longer than a frame can be.
     MessageTooLong,
 }
 

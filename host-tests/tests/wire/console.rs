@@ -99,7 +99,7 @@ impl FakeRobot {
                         Some(150)
                     })?;
                 }
-                return self.staging.piece(offset);
+                return self.staging.outgoing_chunk(offset);
             }
             Command::RestoreBegin { length, crc } => self.staging.begin(length, crc)?,
             Command::RestoreChunk { offset, bytes } => self.staging.chunk(offset, bytes.as_slice())?,

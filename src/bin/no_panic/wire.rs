@@ -79,7 +79,7 @@ pub(crate) fn commands() {
             black_box(Some(200))
         });
         black_box(Outcome::from(taken));
-        black_box(staging.piece(black_box(3)).unwrap_or_else(refuse));
+        black_box(staging.outgoing_chunk(black_box(3)).unwrap_or_else(refuse));
         black_box(staging.begin(black_box(3), black_box(4)).is_ok());
         let bytes = black_box([1; 64]);
         black_box(staging.chunk(black_box(1), bytes.get(..black_box(3)).unwrap_or(&[])).is_ok());

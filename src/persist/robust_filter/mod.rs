@@ -1,7 +1,7 @@
-//! The robust filter in a snapshot: what cannot be computed again from the places and the paths.
+//! The robust filter in a snapshot: everything that cannot be recomputed from the places and the paths.
 //!
-//! A hypothesis is its path and the counts of what left the record; its map, counts and evidence are computed anew. So that
-//! the filter that goes on and the one that is restored are the same, bit for bit, saving computes them anew as well.
+//! Of a hypothesis a snapshot has the path and the counts of places that left the record; map, counts and evidence are
+//! recomputed. Saving recomputes them in the running filter too, so that it and a restored one are equal, bit for bit.
 
 mod hypothesis;
 mod parts;
@@ -45,12 +45,13 @@ impl<const N: usize, const V: usize, const HISTORY: usize> RobustFilter<N, V, HI
 impl<const N: usize, const V: usize, const HISTORY: usize> Persist for RobustFilter<N, V, HISTORY> {
     const SECTION: u8 = FILTER_SECTION;
 
-    /// Writes what the filter knows: settings, places, what it told last, and the hypotheses, the best first, as many as there is
-    /// room for. A buffer of [`RobustFilter::SNAPSHOT_BYTES`] has room for all, and the restored filter then goes on as this one
-    /// does, bit for bit. Cost: one pass over the history for each hypothesis.
+    /// Writes settings, places, the published map, and the hypotheses, the best first, as many as there is room for.
+    ///
+    /// A buffer of [`RobustFilter::SNAPSHOT_BYTES`] has room for all of them; the restored filter then equals this one, bit for
+    /// bit. Cost: one pass over the history for each hypothesis.
     ///
     /// # Errors
-    /// [`SnapshotError::Full`] when there is no room for the best hypothesis.
+    /// [`SnapshotError::Full`] if there is no room for the best hypothesis.
     #[inline(never)]
     fn save(&mut self, writer: &mut Writer<'_>) -> Result<(), SnapshotError> {
         self.make_canonical();
@@ -81,14 +82,14 @@ impl<const N: usize, const V: usize, const HISTORY: usize> Persist for RobustFil
         Ok(())
     }
 
-    /// Goes on with what was written by [`RobustFilter::save`], settings and seed included; faults are counted from 0.
+    /// Replaces the state by that of a section, settings and seed included; fault counts restart from 0.
     ///
-    /// Everything is read and checked before anything is changed. Cost: two passes over the bytes, and one over the history for
+    /// Everything is read and checked before anything changes. Cost: two passes over the bytes, and one over the history for
     /// each hypothesis.
     ///
     /// # Errors
     /// [`SnapshotError::Capacities`] for another kind of filter or other capacities, [`SnapshotError::TooShort`], or
-    /// [`SnapshotError::Contents`]; the filter then goes on as it was.
+    /// [`SnapshotError::Contents`]; the filter does not change then.
     fn restore(&mut self, section: Reader<'_>) -> Result<(), SnapshotError> {
         self.check(section)?;
         self.read(section, true)
@@ -101,7 +102,7 @@ impl<const N: usize, const V: usize, const HISTORY: usize> Persist for RobustFil
 }
 
 impl<const N: usize, const V: usize, const HISTORY: usize> RobustFilter<N, V, HISTORY> {
-    /// Reads a snapshot, and takes it over if it is to be `kept`; else only the drafts are written to.
+    /// Reads a section. `kept` replaces the state; otherwise only the draft changes.
     #[inline(never)]
     fn read(&mut self, mut from: Reader<'_>, kept: bool) -> Result<(), SnapshotError> {
         let head = Head::read::<N, V, HISTORY>(&mut from)?;
@@ -140,7 +141,7 @@ impl<const N: usize, const V: usize, const HISTORY: usize> RobustFilter<N, V, HI
         from.finish()
     }
 
-    /// Brings the filter into the state that its snapshot gives.
+    /// Brings the filter into the state that its own snapshot restores.
     fn make_canonical(&mut self) {
         if self.localise_only {
             // The map is kept as it is, so all have that of the best one.

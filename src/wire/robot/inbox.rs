@@ -1,18 +1,17 @@
-//! The robot's end of the line: bytes in, at most one command in each turn of the main loop.
+//! The receiving end of the robot: bytes in, at most one command per turn of the main loop.
 
 use crate::wire::decoder::Progress;
 use crate::wire::{Command, Decoder, Outcome, Reply, Request};
 use crate::{FaultCounters, FaultKind};
 
-/// Takes whatever comes on the robot's receive line, and hands on at most one command in each turn of the main loop.
+/// Decodes the bytes of the robot's receive line, and executes at most one command per turn of the main loop.
 ///
-/// However much comes, the work is bounded: [`Inbox::take`] costs a constant amount for a byte on the average (a closing
-/// zero costs the CRC of the bytes before it), and in each turn only [`Inbox::BYTES_PER_TURN`] bytes are looked at; the rest is
-/// thrown away. One request waits for its turn. Bytes that are no request are counted as `WireCorrupt`, requests
-/// for which there is no room and bytes beyond those of a turn as `CommandFlood`.
+/// The work is bounded at any rate of input. [`Inbox::take`] takes amortised constant time per byte (a closing zero costs the
+/// CRC of its frame). Each turn decodes at most [`Inbox::BYTES_PER_TURN`] bytes and drops the rest. One request can wait for
+/// its turn. Bytes that are not a request are counted as `WireCorrupt`, requests without room and bytes beyond those of a turn as
+/// `CommandFlood`.
 ///
-/// A request that comes again, because its reply was lost, gets the same reply and is not executed again.
-/// Memory: about 450 bytes.
+/// A repeated request gets the same reply and is not executed again. Memory: about 450 bytes.
 ///
 /// ```
 /// use toposlam::wire::{Command, Encoder, Inbox, MAX_FRAME_BYTES, Outcome, Reply, Request};
@@ -38,7 +37,7 @@ use crate::{FaultCounters, FaultKind};
 #[derive(Clone, Debug)]
 pub struct Inbox {
     decoder: Decoder<Request>,
-    /// Whether a request waits, and which. An `Option` would not be all zero, and a `static` inbox would not lie in `.bss`.
+    /// Whether a request waits, and which. A `None` is not all zero, and a `static` inbox would not lie in `.bss`.
     is_waiting: bool,
     waiting: Request,
     /// Whether a request was executed, the last one, and the reply to it.
@@ -49,10 +48,10 @@ pub struct Inbox {
 }
 
 impl Inbox {
-    /// How many bytes are looked at in one turn: room for two of the longest frames and some noise.
+    /// The most bytes that are decoded per turn: room for two of the longest frames and some noise.
     pub const BYTES_PER_TURN: u16 = 256;
 
-    /// An inbox that has received nothing.
+    /// An empty inbox.
     pub const fn new() -> Self {
         const NONE: Request = Request { id: 0, command: Command::Info };
         Self {
@@ -66,7 +65,7 @@ impl Inbox {
         }
     }
 
-    /// Takes a byte of the line.
+    /// Decodes a byte of the line.
     pub fn take(&mut self, byte: u8) {
         if self.taken >= Self::BYTES_PER_TURN {
             if self.taken == Self::BYTES_PER_TURN {
@@ -88,8 +87,8 @@ impl Inbox {
         }
     }
 
-    /// Once in each turn of the main loop: executes the command that waits, unless it is the last one again, and gives the
-    /// reply to be sent. Bytes are taken again from here on.
+    /// Ends a turn of the main loop: executes the waiting command, unless it repeats the last one, and returns the reply to
+    /// send. The next bytes belong to the next turn.
     pub fn turn(&mut self, execute: impl FnOnce(&Command) -> Outcome) -> Option<Reply> {
         self.taken = 0;
         if !core::mem::take(&mut self.is_waiting) {
@@ -108,7 +107,7 @@ impl Inbox {
         Some(Reply { request: request.id, outcome })
     }
 
-    /// What was wrong with what came.
+    /// The faults of the received bytes since the start.
     pub const fn faults(&self) -> &FaultCounters {
         &self.faults
     }

@@ -1,4 +1,4 @@
-//! The robot's side of the line: it reports what changes, takes in requests, and puts snapshots together that come in pieces.
+//! The robot's side of the line: it reports changes, receives requests, and transfers snapshots in chunks.
 
 mod inbox;
 mod reporter;

@@ -1,13 +1,12 @@
-//! The robot's one buffer for snapshots that cross the line, either way.
+//! The robot's buffer for snapshots that are transferred over the line, in either direction.
 
 use crate::wire::digest::crc32;
 use crate::wire::{Chunk, Outcome, Refusal};
 
-/// A snapshot on its way out, or on its way in, in a buffer of the caller's. One drops the other.
+/// A snapshot that is sent or received in chunks, in the caller's buffer. Starting one drops the other.
 ///
-/// Incoming pieces come in order and may come again, so a sender that hears no reply repeats the piece and goes on. A piece
-/// that is refused leaves what was received as it was. Cost: a piece is copied once; [`Staging::commit`] takes the CRC of
-/// the whole.
+/// Chunks are received in order and may be repeated, so a sender without a reply repeats the chunk. A refused chunk changes
+/// nothing. Cost: each chunk is copied once; [`Staging::commit`] computes the CRC of the whole snapshot.
 #[derive(Debug)]
 pub struct Staging<'buffer> {
     buffer: Option<&'buffer mut [u8]>,
@@ -17,11 +16,11 @@ pub struct Staging<'buffer> {
 #[derive(Clone, Copy, Debug)]
 enum Holds {
     Nothing,
-    /// A snapshot that was taken.
+    /// A snapshot to be sent.
     Outgoing {
         length: u16,
     },
-    /// The first bytes of a snapshot to be restored.
+    /// The first bytes of a snapshot that is received.
     Incoming {
         length: u16,
         crc: u32,
@@ -30,12 +29,12 @@ enum Holds {
 }
 
 impl<'buffer> Staging<'buffer> {
-    /// Nothing in a buffer; a snapshot that is longer, or longer than 65535 bytes, is refused.
+    /// An empty buffer. Longer snapshots, and those above 65535 bytes, are refused.
     pub const fn new(buffer: &'buffer mut [u8]) -> Self {
         Self { buffer: Some(buffer), holds: Holds::Nothing }
     }
 
-    /// Without a buffer every snapshot is too long.
+    /// No buffer: every snapshot is too long.
     pub const fn without_buffer() -> Self {
         Self { buffer: None, holds: Holds::Nothing }
     }
@@ -48,10 +47,11 @@ impl<'buffer> Staging<'buffer> {
         self.buffer.as_deref_mut().unwrap_or(&mut [])
     }
 
-    /// Takes a snapshot, and drops what the buffer held: `write` gets the buffer and tells how many bytes it wrote, `None` when it could not.
+    /// Takes a snapshot to be sent and drops the previous contents. `write` gets the buffer and returns the length, `None` if
+    /// the snapshot does not fit.
     ///
     /// # Errors
-    /// [`Refusal::TooLong`] when it could not, or says that it wrote more than there is room for.
+    /// [`Refusal::TooLong`] if the snapshot does not fit.
     pub fn take(&mut self, write: impl FnOnce(&mut [u8]) -> Option<usize>) -> Result<(), Refusal> {
         self.holds = Holds::Nothing;
         let length =
@@ -60,26 +60,26 @@ impl<'buffer> Staging<'buffer> {
         Ok(())
     }
 
-    /// The whole snapshot that was taken; nothing when none was.
+    /// The snapshot to be sent; empty if there is none.
     pub fn taken(&self) -> &[u8] {
         let length = if let Holds::Outgoing { length } = self.holds { length } else { 0 };
         self.buffer().get(..usize::from(length)).unwrap_or(&[])
     }
 
-    /// The piece of the snapshot that was taken from a byte on; an [`Outcome::Snapshot`], empty at the end.
+    /// The chunk of the snapshot from an offset on, as an [`Outcome::Snapshot`]; empty at the end.
     ///
     /// # Errors
-    /// [`Refusal::NotNow`] when none was taken, [`Refusal::OutOfRange`] beyond its end.
-    pub fn piece(&self, offset: u16) -> Result<Outcome, Refusal> {
+    /// [`Refusal::NotNow`] if no snapshot was taken, [`Refusal::OutOfRange`] beyond its end.
+    pub fn outgoing_chunk(&self, offset: u16) -> Result<Outcome, Refusal> {
         let Holds::Outgoing { length: total } = self.holds else { return Err(Refusal::NotNow) };
         let rest = self.buffer().get(usize::from(offset)..usize::from(total)).ok_or(Refusal::OutOfRange)?;
         Ok(Outcome::Snapshot { total, offset, bytes: Chunk::new(rest.iter().copied()) })
     }
 
-    /// Gets ready for a snapshot of so many bytes with this CRC-32 ISO-HDLC.
+    /// Starts to receive a snapshot of this length with this CRC-32 ISO-HDLC.
     ///
     /// # Errors
-    /// [`Refusal::TooLong`] when the buffer is shorter.
+    /// [`Refusal::TooLong`] if the buffer is shorter.
     pub fn begin(&mut self, length: u16, crc: u32) -> Result<(), Refusal> {
         if usize::from(length) > self.buffer().len() {
             return Err(Refusal::TooLong);
@@ -88,11 +88,11 @@ impl<'buffer> Staging<'buffer> {
         Ok(())
     }
 
-    /// Takes a piece of it.
+    /// Receives a chunk.
     ///
     /// # Errors
-    /// [`Refusal::NotNow`] before [`Staging::begin`], [`Refusal::MissingChunk`] when bytes before the piece were not
-    /// received, and [`Refusal::OutOfRange`] when it reaches beyond the end.
+    /// [`Refusal::NotNow`] before [`Staging::begin`], [`Refusal::MissingChunk`] if bytes before the chunk are missing, and
+    /// [`Refusal::OutOfRange`] beyond the announced length.
     pub fn chunk(&mut self, offset: u16, bytes: &[u8]) -> Result<(), Refusal> {
         let Holds::Incoming { length, received, .. } = &mut self.holds else { return Err(Refusal::NotNow) };
         if offset > *received {
@@ -108,7 +108,7 @@ impl<'buffer> Staging<'buffer> {
         Ok(())
     }
 
-    /// The whole snapshot, when every byte was received and their CRC is the one that was told.
+    /// The whole snapshot, if every byte was received and the CRC is the announced one.
     ///
     /// # Errors
     /// [`Refusal::NotNow`] before [`Staging::begin`], [`Refusal::MissingChunk`] and [`Refusal::BadCrc`].
@@ -147,17 +147,17 @@ mod tests {
     fn a_snapshot_goes_out_in_pieces_as_often_as_it_is_asked_for() {
         let mut buffer = [0; 100];
         let mut staging = Staging::new(&mut buffer);
-        assert_eq!(staging.piece(0), Err(Refusal::NotNow));
+        assert_eq!(staging.outgoing_chunk(0), Err(Refusal::NotNow));
         staging.take(write(70)).unwrap();
         for _ in 0..2 {
-            assert_eq!(bytes(staging.piece(0)), (1..=64).collect::<Vec<u8>>());
-            assert_eq!(bytes(staging.piece(64)), (65..=70).collect::<Vec<u8>>());
-            assert_eq!(bytes(staging.piece(70)), []);
+            assert_eq!(bytes(staging.outgoing_chunk(0)), (1..=64).collect::<Vec<u8>>());
+            assert_eq!(bytes(staging.outgoing_chunk(64)), (65..=70).collect::<Vec<u8>>());
+            assert_eq!(bytes(staging.outgoing_chunk(70)), []);
         }
-        assert_eq!(staging.piece(71), Err(Refusal::OutOfRange));
+        assert_eq!(staging.outgoing_chunk(71), Err(Refusal::OutOfRange));
         assert_eq!(staging.take(write(101)), Err(Refusal::TooLong));
         assert_eq!(staging.take(|_| Some(101)), Err(Refusal::TooLong));
-        assert_eq!(staging.piece(0), Err(Refusal::NotNow));
+        assert_eq!(staging.outgoing_chunk(0), Err(Refusal::NotNow));
     }
 
     #[test]
@@ -202,6 +202,6 @@ mod tests {
         staging.take(write(5)).unwrap();
         assert_eq!(staging.commit(), Err(Refusal::NotNow));
         staging.begin(5, 0).unwrap();
-        assert_eq!(staging.piece(0), Err(Refusal::NotNow));
+        assert_eq!(staging.outgoing_chunk(0), Err(Refusal::NotNow));
     }
 }
