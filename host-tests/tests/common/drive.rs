@@ -1,4 +1,4 @@
-//! A core filter and the reference filter side by side, on the same observations and the same random draws.
+//! The core's paper filter and the reference filter on the same observations and the same random draws.
 
 pub use super::split_mix::Random;
 use super::{fingerprint, length};
@@ -11,16 +11,16 @@ use toposlam_host_tests::ngram::NgramSet;
 
 /// Particles of the core in these tests.
 pub const PARTICLES: usize = 10;
-/// Vertices of its maps.
+/// Capacity of its maps.
 pub const VERTICES: usize = 8;
-/// Words of its history: 32 places, so that longer drives wrap.
+/// Words of its history: 32 places, fewer than a long drive has.
 pub const WORDS: usize = 1;
 /// Words of a prior: 512 n-grams.
 pub const PRIOR_WORDS: usize = 32;
 
-/// By how much a logarithm of Eq. 7 or 8 may be off, in nats, and relative to its size.
+/// Tolerance of a logarithm of Eq. 7 or 8, in nats, and relative to its magnitude.
 pub const LN_TOLERANCE: (f64, f64) = (2e-5, 1e-6);
-/// By how much each of the A² factors of Eq. 9 may be off, in nats: rounding, what f32 loses in 1 − φ, and, where σ_l is
+/// Tolerance of each of the A² factors of Eq. 9, in nats: rounding, the cancellation in 1 − φ in f32, and, where σ_l is
 /// too large for the core's table to hold every label difference, linear interpolation between points h = 0.035 σ_l
 /// apart, which errs by up to h²/8 times the curvature 2φ / (1 − φ).
 pub fn penalty_tolerance(parameters: &Parameters) -> f64 {
@@ -29,19 +29,19 @@ pub fn penalty_tolerance(parameters: &Parameters) -> f64 {
     1e-5 + 1e-7 / (1.0 - phi) + interpolation
 }
 
-/// By how much a weight may be off, relative to the best one: it is rounded to this.
+/// Tolerance of a weight relative to the best one: weights are rounded to this.
 pub const WEIGHT_STEP: f64 = 1.0 / (1 << 20) as f64;
-/// Less than this, relative to the best one, is never proposed: it rounds to no step.
+/// A candidate with a smaller weight, relative to the best one, is never proposed: it rounds to 0.
 pub const LEAST_PROPOSAL: f64 = WEIGHT_STEP / 2.0;
-/// By how much an acceptance may be off besides its logarithm: it is a single-precision number.
+/// Tolerance of an acceptance besides its logarithm: it is a single-precision number.
 pub const ACCEPTANCE_STEP: f64 = 1.0 / (1 << 22) as f64;
-/// After so many proposals for one place the core weighs all candidates in full.
+/// After this number of proposals for one place the core computes all weights.
 pub const MOST_PROPOSALS: usize = 128;
-/// Eq. 7 and 8 do not fall below e to the minus this in the core.
+/// Lower bound of Eq. 7 and 8 in the core: e to the minus this.
 pub const LARGEST_LOSS: f64 = 4096.0;
 
 impl Random {
-    /// A connected building of so many places with a few look-alikes, labels on the grid.
+    /// A connected building of this many places, some with equal labels, all labels on the grid.
     pub fn building(&mut self, places: usize) -> Graph {
         let spacing_mm = [60.0, 200.0, 400.0][self.below(3)];
         let labels: Vec<f64> = (0..places).map(|_| 1000.0 + spacing_mm * self.below(4) as f64).collect();
@@ -55,7 +55,7 @@ impl Random {
         building
     }
 
-    /// What a robot on a random walk through a building measures, with noise of up to so many steps.
+    /// The measurements of a robot on a random walk through a building, with a noise of up to this many steps.
     pub fn walk(&mut self, building: &Graph, observations: usize, noise_steps: usize) -> Vec<f64> {
         let mut place = self.below(building.vertices());
         let mut observe = |_| {
@@ -68,22 +68,22 @@ impl Random {
     }
 }
 
-/// What the filters hold their maps against.
+/// The evidence for the consistency of the maps.
 pub enum Evidence {
-    /// Their own history.
+    /// The filter's own history.
     OnLine,
     /// The n-grams of an earlier exploration.
     Prior(Vec<f64>),
 }
 
-/// How close to a tie the draws of a drive were.
+/// How many draws of a drive were near a tie.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Tally {
-    /// Random draws in all.
+    /// All random draws.
     pub draws: usize,
-    /// Draws so close to the boundary of two candidates that the tolerance lets either have it.
+    /// Draws so near the boundary of two candidates that the tolerance allows both.
     pub ties: usize,
-    /// Draws whose candidate differs, every one of them a tie.
+    /// Draws with different candidates; each is near a tie.
     pub differing: usize,
 }
 
@@ -95,12 +95,12 @@ pub struct Drive {
     prior: Option<(Box<Prior<VERTICES, PRIOR_WORDS>>, NgramSet)>,
     particles: Vec<Particle>,
     history_mm: Vec<f64>,
-    /// How close the draws were so far.
+    /// The draws so far.
     pub tally: Tally,
 }
 
 impl Drive {
-    /// Both filters with one configuration, before the first observation.
+    /// Starts both filters with one configuration.
     pub fn new(config: Config, evidence: &Evidence) -> Self {
         let n = usize::from(config.ngram_length);
         let parameters = Parameters {
@@ -137,7 +137,7 @@ impl Drive {
         Self { config, parameters, core, prior, particles, history_mm: Vec::new(), tally: Tally::default() }
     }
 
-    /// One place for both filters; panics where they differ.
+    /// Observes a place with both filters; panics if they differ.
     pub fn observe(&mut self, observation_mm: f64, random: &mut Random) {
         let mut of_reference = Random(random.0);
         let draws = || (random.bits() >> 32) as u32;
@@ -158,7 +158,7 @@ impl Drive {
         self.check_particles(&pool);
     }
 
-    /// How often the core met a fault of a kind.
+    /// The core's count of a kind of fault.
     pub fn faults(&self, kind: FaultKind) -> u32 {
         self.core.faults().count(kind)
     }
@@ -168,7 +168,7 @@ impl Drive {
         self.core.particles().iter().map(|particle| particle.map.vertices().len()).collect()
     }
 
-    /// The candidates that the core drew, in the order of the pool.
+    /// The candidates drawn by the core, in the order of the pool.
     fn chosen_by_the_core(&self, pool: &[Candidate]) -> Vec<usize> {
         let candidate_of = |particle: &CoreParticle<VERTICES>| {
             let is_it = |candidate: &Candidate| {
@@ -180,8 +180,8 @@ impl Drive {
         self.core.particles().iter().flat_map(repeated).collect()
     }
 
-    /// The reference chooses the same candidates with the same random numbers, unless one of them lies so close to a
-    /// boundary that the tolerance does not tell.
+    /// Asserts that the reference draws the same candidates with the same random numbers, except for draws within the tolerance
+    /// of a boundary.
     fn check_choice(&mut self, pool: &[Candidate], chosen: &[usize], random: impl FnMut() -> f64) {
         let proposals = filter::proposals(pool, LEAST_PROPOSAL);
         let acceptances = filter::acceptances(pool, &proposals);
@@ -213,17 +213,17 @@ impl Drive {
         );
     }
 
-    /// Whether a candidate is so close to the least that is proposed that it may be proposed or not.
+    /// Whether a candidate is within the tolerance of the smallest weight that is proposed.
     fn floor_is_close(&self, pool: &[Candidate]) -> bool {
         let sure = filter::proposals(pool, LEAST_PROPOSAL * 1.001);
         let possible = filter::proposals(pool, LEAST_PROPOSAL * 0.999);
         sure.iter().zip(&possible).any(|(sure, possible)| sure != possible)
     }
 
-    /// Where one candidate's share of the proposals ends and the next one's begins, and by how much that may be off.
+    /// The boundary between one candidate's share of the proposals and the next one's, and its tolerance.
     ///
-    /// When all logarithms are off by at most ε, a share c of the sum is off by at most 2 ε c (1 − c); the rounding of the
-    /// weights comes on top.
+    /// If all logarithms have an error of at most ε, a share c of the sum has an error of at most 2 ε c (1 − c), plus the
+    /// rounding of the weights.
     fn boundaries(&self, pool: &[Candidate], proposals: &[f64]) -> Vec<(f64, f64)> {
         let proposed = pool.iter().zip(proposals).filter(|&(_, &weight)| weight > 0.0);
         let epsilon = proposed.map(|(candidate, _)| self.tolerance_of_weight(candidate)).fold(0.0, f64::max);
@@ -239,7 +239,7 @@ impl Drive {
         boundaries
     }
 
-    /// By how much ln of Eq. 6 may be off.
+    /// Tolerance of the logarithm of Eq. 6.
     fn tolerance_of_weight(&self, candidate: &Candidate) -> f64 {
         let of_penalty = penalty_tolerance(&self.parameters) * candidate.map.graph.vertices().pow(2) as f64;
         let gaussian = candidate.ln_observation + candidate.ln_consistency;
@@ -260,7 +260,7 @@ impl Drive {
         let difference = nats(best.factors.ln_weight_q16()) - heaviest.ln_weight();
         assert!(difference.abs() <= self.tolerance_of_weight(heaviest), "{update:?} {difference}");
         assert_eq!((update.vertex, update.factors), (best.at, WeightFactors::Paper(best.factors)));
-        // The lead that is told is a bound on the true one, at which the rivals are as near to the evidence as any.
+        // The reported lead is a bound of the true one: it assumes the best consistency for the rivals.
         let proposals = filter::proposals(pool, LEAST_PROPOSAL * 1.1);
         let rivals = || {
             let is_rival =

@@ -2,7 +2,7 @@
 
 use toposlam_eval::environment::{Environment, Place};
 
-/// Six rooms, two of which look alike: Fig. 1(b) of the paper.
+/// Six rooms, two of them with equal labels: Fig. 1(b) of the paper.
 pub fn six_rooms() -> Environment {
     include_str!("../../../host/eval/environments/table-i.toml").parse().expect("a shipped environment")
 }
@@ -12,12 +12,12 @@ pub fn floor() -> Environment {
     include_str!("../../../host/eval/environments/wean-surrogate-sd.toml").parse().expect("a shipped environment")
 }
 
-/// A ring of eight places in which the same three rooms follow each other twice: a b c d a b c e.
+/// A ring of eight places that repeats a sequence of three labels: a b c d a b c e.
 pub fn ring_with_a_repeated_part() -> Environment {
     ring(&[900.0, 1300.0, 1700.0, 2100.0, 900.0, 1300.0, 1700.0, 2500.0])
 }
 
-/// Five places in a ring with a chord, all different.
+/// A ring of five places with a chord, all labels different.
 pub fn easy() -> Environment {
     let mut edges = ring_edges(5);
     edges.push([0, 2]);

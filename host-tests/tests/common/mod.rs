@@ -1,6 +1,6 @@
 //! The same graph, history or set of n-grams for the reference and for the core.
 //!
-//! The reference counts in millimetres of an f64, the core in steps of 2 mm; every label here is on that grid.
+//! The reference uses millimetres in f64, the core steps of 2 mm; all labels are on that grid.
 #![allow(dead_code, unreachable_pub, reason = "each test binary compiles this and uses its own part")]
 
 pub mod drive;
@@ -16,12 +16,12 @@ use toposlam_host_tests::consistency::Hausdorff;
 use toposlam_host_tests::graph::Graph;
 use toposlam_host_tests::ngram::{Ngram, NgramSet};
 
-/// The words of the evidence in these tests: histories of 128 places.
+/// Words of a history: 128 places.
 pub const HISTORY_WORDS: usize = 4;
-/// The words of the tables in these tests: 2048 n-grams.
+/// Words of a table: 2048 n-grams.
 pub const TABLE_WORDS: usize = 128;
 
-/// A fingerprint of a label on the 2 mm grid.
+/// The fingerprint of a label on the 2 mm grid.
 pub fn fingerprint(label_mm: f64) -> Fingerprint {
     let steps = label_mm / f64::from(Fingerprint::STEP_MM);
     assert!(steps.fract() == 0.0, "{label_mm} mm is not on the grid");
@@ -33,12 +33,12 @@ pub fn vertex(number: usize) -> VertexId {
     VertexId::new(number as u8).expect("tests number vertices from 0 to 63")
 }
 
-/// The core's length of n-grams.
+/// The core's type for a length of n-grams.
 pub fn length(n: usize) -> NgramLength {
     NgramLength::new(n as u8).expect("tests use n from 2 to 7")
 }
 
-/// The label that an n-gram of this length holds: the core's packed n-grams drop low bits at n = 6 and 7.
+/// The label as an n-gram of this length stores it: the core's packed n-grams drop low bits at n = 6 and 7.
 pub fn in_ngram_mm(n: usize) -> impl Fn(f64) -> f64 + Copy {
     let grid_mm = f64::from(length(n).label_step_mm());
     move |label_mm| (label_mm / grid_mm).floor() * grid_mm
@@ -56,7 +56,7 @@ pub fn core_map<const V: usize>(graph: &Graph) -> Map<V> {
     map
 }
 
-/// The core's history of these labels, of which it keeps the newest.
+/// The core's history of these labels; a full history drops the oldest.
 pub fn core_history<const WORDS: usize>(history_mm: &[f64]) -> History<WORDS> {
     let mut history = History::new();
     for &label_mm in history_mm {
@@ -65,7 +65,7 @@ pub fn core_history<const WORDS: usize>(history_mm: &[f64]) -> History<WORDS> {
     history
 }
 
-/// The core's table of the n-grams of a history, built observation by observation.
+/// The core's table of the n-grams of a history, extended with each observation.
 pub fn core_table_of_history(history_mm: &[f64], n: usize) -> NgramTable<TABLE_WORDS> {
     let mut history = History::<HISTORY_WORDS>::new();
     let mut table = NgramTable::new(length(n));
@@ -76,7 +76,7 @@ pub fn core_table_of_history(history_mm: &[f64], n: usize) -> NgramTable<TABLE_W
     table
 }
 
-/// The n-grams of a table, as the reference writes them.
+/// The n-grams of a table in the reference's type.
 pub fn ngrams_of<const WORDS: usize>(table: &NgramTable<WORDS>) -> NgramSet {
     let length = table.length();
     let label_mm = |step: u16| f64::from(step) * f64::from(length.label_step_mm());
@@ -86,7 +86,7 @@ pub fn ngrams_of<const WORDS: usize>(table: &NgramTable<WORDS>) -> NgramSet {
     table.ngrams().iter().map(|ngram| Ngram::new(&labels(ngram))).collect()
 }
 
-/// What the core measures, in millimetres: both directions of Eq. 2, then each half.
+/// The distances of the core, in millimetres: both directions of Eq. 2, then each half.
 pub fn core_distances_mm<const WORDS: usize, const INDICES: usize>(
     graph: &Graph,
     evidence: &impl Evidence<WORDS>,
@@ -100,7 +100,7 @@ pub fn core_distances_mm<const WORDS: usize, const INDICES: usize>(
     })
 }
 
-/// What the reference measures, in the same order.
+/// The distances of the reference, in the same order.
 pub fn reference_distances_mm(distance: Hausdorff) -> [f64; 3] {
     [distance.two_sided(), distance.map_to_history, distance.history_to_map]
 }

@@ -1,4 +1,4 @@
-//! A filter that maps nothing and notes what it is told.
+//! A filter without a map that records its observations.
 
 use toposlam::persist::Persist;
 use toposlam::persist::snapshot::{Reader, SnapshotError, Writer};
@@ -8,7 +8,7 @@ use toposlam::{
     WeightFactors, WorstNgram,
 };
 
-/// What a mapper told its filter. Started with the capacity of its history, which a snapshot of it holds; 0 is out of range.
+/// The observations that a mapper passed to its filter. The configuration is the capacity of its history, which a snapshot contains; 0 is out of range.
 pub struct Notes {
     pub observations: Vec<Observation>,
     pub history: u16,

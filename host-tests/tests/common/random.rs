@@ -6,7 +6,7 @@ use proptest::test_runner::{Config, RngSeed};
 use toposlam::Fingerprint;
 use toposlam_host_tests::graph::Graph;
 
-/// So many cases, the same ones in every run.
+/// A number of cases, the same in every run.
 pub fn cases(cases: u32) -> Config {
     Config { cases, rng_seed: RngSeed::Fixed(0x7090_51A0), failure_persistence: None, ..Config::default() }
 }
@@ -16,7 +16,7 @@ pub fn label_mm(steps: u16) -> f64 {
     f64::from(steps.min(Fingerprint::MAX.steps())) * f64::from(Fingerprint::STEP_MM)
 }
 
-/// Where labels come from: anywhere, or from a few categories with a little noise, which gives aliases.
+/// Labels, either uniform or from a few categories with noise, which gives aliases.
 fn label() -> impl Strategy<Value = f64> {
     let noise = prop_oneof![3 => Just(0), 1 => 0_u16..20];
     let category = (0_u16..5, noise).prop_map(|(category, noise)| 500 + 60 * category + noise);
@@ -24,7 +24,7 @@ fn label() -> impl Strategy<Value = f64> {
     steps.prop_map(label_mm)
 }
 
-/// A graph of up to 12 vertices: connected or not, with isolated vertices, and with edges from a vertex to itself.
+/// A graph of up to 12 vertices: connected or not, possibly with isolated vertices and self-loops.
 pub fn graph() -> impl Strategy<Value = Graph> {
     let labels = vec(label(), 0..=12);
     let edges = vec((any::<prop::sample::Index>(), any::<prop::sample::Index>()), 0..=16);
@@ -37,7 +37,7 @@ pub fn graph() -> impl Strategy<Value = Graph> {
     })
 }
 
-/// A graph with so many edges that a place has dozens of ways on.
+/// A dense graph: a place has dozens of neighbours.
 fn dense_graph() -> impl Strategy<Value = Graph> {
     let indices = || any::<prop::sample::Index>();
     (vec(label(), 5..=8), vec((indices(), indices()), 12..=24)).prop_map(|(labels, edges)| {
@@ -46,7 +46,7 @@ fn dense_graph() -> impl Strategy<Value = Graph> {
     })
 }
 
-/// A graph whose labels all differ, dense or with a hub, and which of its n-grams an exploration missed.
+/// A graph with distinct labels, dense or with a hub, and the index of an n-gram that an exploration missed.
 pub fn graph_and_what_is_missing() -> impl Strategy<Value = (Graph, Vec<prop::sample::Index>)> {
     let indices = || any::<prop::sample::Index>();
     let noise_steps = vec(0_u16..10, 5..=6);
@@ -63,7 +63,7 @@ pub fn graph_and_what_is_missing() -> impl Strategy<Value = (Graph, Vec<prop::sa
     })
 }
 
-/// A noisy walk on a graph: it starts anew at any vertex where it cannot go on.
+/// A noisy walk on a graph; at a vertex without a neighbour it continues at a random one.
 fn walk_on(graph: impl Strategy<Value = Graph>, longest: usize) -> impl Strategy<Value = (Graph, Vec<f64>)> {
     let noise_mm = prop_oneof![Just(0.0), (-10_i16..=10).prop_map(|steps| 2.0 * f64::from(steps))];
     (graph, vec((any::<prop::sample::Index>(), noise_mm), 0..=longest)).prop_map(|(graph, steps)| {
@@ -90,7 +90,7 @@ pub fn graph_and_its_history(longest: usize) -> impl Strategy<Value = (Graph, Ve
     walk_on(graph(), longest)
 }
 
-/// A graph whose places have dozens of ways on, and a noisy walk on it.
+/// A dense graph and a noisy walk on it.
 pub fn dense_graph_and_its_history(longest: usize) -> impl Strategy<Value = (Graph, Vec<f64>)> {
     walk_on(dense_graph(), longest)
 }
@@ -100,12 +100,12 @@ pub fn history(longest: usize) -> impl Strategy<Value = Vec<f64>> {
     vec(label(), 0..=longest)
 }
 
-/// A graph and a history that has, or has not, to do with it.
+/// A graph, and a history that is a walk on it or is unrelated.
 pub fn graph_and_history(longest: usize) -> impl Strategy<Value = (Graph, Vec<f64>)> {
     prop_oneof![2 => graph_and_its_history(longest), 1 => (graph(), history(longest))]
 }
 
-/// Some sequences of n labels that need not come from any history.
+/// Arbitrary sequences of n labels.
 pub fn sequences(n: usize, most: usize) -> impl Strategy<Value = Vec<Vec<f64>>> {
     vec(vec(label(), n), 0..=most)
 }

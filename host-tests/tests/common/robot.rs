@@ -1,24 +1,24 @@
-//! A robot on a random walk through an environment, and how right the map is that a robust filter makes of it.
+//! A robot on a random walk through an environment, and the comparison of a robust filter's map with the environment.
 
 use super::drive::Random;
 use std::collections::BTreeSet;
 use toposlam::{Fingerprint, Observation, RobustFilter, Turn};
 use toposlam_eval::{environment::Environment, equivalence::SmallestEquivalent, graph::Graph, score::score_map};
 
-/// What the robot tells besides fingerprints, and how often that is missing or wrong.
+/// The hints of the robot besides fingerprints, and how often they are missing or wrong.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Hints {
-    /// Whether it tells how it turned.
+    /// Whether it gives turns.
     pub turn: bool,
-    /// Whether it tells how many ways there are; in one of ten cases one more or less.
+    /// Whether it gives degrees; one in ten is wrong by one.
     pub degree: bool,
     /// How often a hint is missing, in percent.
     pub missing_percent: usize,
-    /// How often a turn is told wrong, in percent.
+    /// How often a turn is wrong, in percent.
     pub wrong_percent: usize,
 }
 
-/// Turn hints that are always there and always right.
+/// Turn hints that are never missing and always right.
 pub const TURNS: Hints = Hints { turn: true, degree: false, missing_percent: 0, wrong_percent: 0 };
 
 /// A robot in an environment.
@@ -28,23 +28,23 @@ pub struct Robot<'a> {
     random: Random,
     /// The places it visited, in order.
     pub walk: Vec<usize>,
-    /// Where its drive since it was last put down began in `walk`.
+    /// Index in `walk` at which the present sequence starts.
     put_down: usize,
     next: Option<(usize, bool)>,
 }
 
 impl<'a> Robot<'a> {
-    /// A robot that is put down at a random place.
+    /// A robot at a random place.
     pub fn new(environment: &'a Environment, hints: Hints, seed: u64) -> Self {
         Self { environment, hints, random: Random(seed), walk: Vec::new(), put_down: 0, next: None }
     }
 
-    /// Carries the robot to a place, which it visits next; it may tell of it or not.
+    /// Kidnaps the robot: its next place is this one. It may report that or not.
     pub fn carry_to(&mut self, place: usize, is_told: bool) {
         self.next = Some((place, is_told));
     }
 
-    /// Carries the robot to a random place that is no neighbour of where it is, and is not where it is.
+    /// Kidnaps the robot to a random place that is neither its own nor a neighbour.
     pub fn carry_off(&mut self, is_told: bool) {
         let here = *self.walk.last().expect("it has been somewhere");
         let near = &self.environment.neighbours()[here];
@@ -54,7 +54,7 @@ impl<'a> Robot<'a> {
         self.carry_to(place, is_told);
     }
 
-    /// Drives to a random neighbour, back to where it came from included, and looks.
+    /// Drives to a random neighbour, possibly back, and returns the observation.
     pub fn step(&mut self) -> Observation {
         let carried = self.next.take();
         let place = match (carried, self.walk.last()) {
@@ -84,7 +84,7 @@ impl<'a> Robot<'a> {
         Observation { fingerprint: self.look(place), turn, degree, starts_sequence: begins }
     }
 
-    /// A Gaussian fingerprint of a place: the sum of twelve uniform numbers.
+    /// The fingerprint of a place with Gaussian noise, the sum of twelve uniform numbers.
     pub fn look(&mut self, place: usize) -> Fingerprint {
         let place = self.environment.places()[place];
         let uniform = |_| self.random.below(1 << 20) as f64 / f64::from(1 << 20) - 0.5;
@@ -93,8 +93,8 @@ impl<'a> Robot<'a> {
         Fingerprint::from_steps(steps as u16).unwrap_or(Fingerprint::MAX)
     }
 
-    /// Whether the map of a filter is the part of the environment that was traversed, vertex by vertex and edge by edge,
-    /// places merged that no walk tells apart.
+    /// Whether the map of a filter is isomorphic to the traversed part of the environment, with places merged that no walk
+    /// distinguishes.
     pub fn is_mapped_by<const N: usize, const V: usize, const HISTORY: usize>(
         &self,
         filter: &RobustFilter<N, V, HISTORY>,
@@ -103,7 +103,7 @@ impl<'a> Robot<'a> {
         self.is_exact(filter, &truth)
     }
 
-    /// Whether the map of a filter is the whole environment.
+    /// Whether the map of a filter is isomorphic to the whole environment.
     pub fn is_all_mapped_by<const N: usize, const V: usize, const HISTORY: usize>(
         &self,
         filter: &RobustFilter<N, V, HISTORY>,
@@ -125,7 +125,7 @@ impl<'a> Robot<'a> {
         score_map(&graph, &path, &truth.graph, &classes).exact
     }
 
-    /// The place that a vertex of a path was mostly visited at.
+    /// The place of most visits of a vertex on the path.
     pub fn place_of(&self, path: &[u8], vertex: u8) -> Option<usize> {
         let newest = &self.walk[self.walk.len() - path.len()..];
         let visits = || path.iter().zip(newest).filter(|&(&visited, _)| visited == vertex).map(|(_, &place)| place);

@@ -1,4 +1,4 @@
-//! A robust filter under watch: after every place, what it tells is held to the definitions.
+//! A robust filter whose results are compared with their definitions after every place.
 
 use toposlam::{
     Consistency, Direction, Fingerprint, History, NgramLength, Observation, RobustConfig, RobustFilter, Turn, Update,
@@ -8,29 +8,29 @@ use toposlam_host_tests::graph::Graph;
 use toposlam_host_tests::ngram::{Ngram, NgramSet, grams_of_graph};
 use toposlam_host_tests::robust::{self, Noise, SURPLUS_SHARE, Weighed, mean};
 
-/// By how much the evidence of the core may be off, in nats and relative to its size: sums of f32 over some dozen places.
+/// Tolerance of the core's evidence, in nats and relative to its magnitude: sums of f32 over some dozen places.
 pub const EVIDENCE_TOLERANCE: (f64, f64) = (5e-3, 2e-5);
 /// By how much its surplus may be off, in nats.
 pub const SURPLUS_TOLERANCE: f64 = 5e-3;
-/// By how much a probability may be off, and the sum of several.
+/// Tolerance of a probability, and of a sum of several.
 pub const PROBABILITY_TOLERANCE: f64 = 1e-3;
 /// The core considers at least those vertices for a place that explain it not so many nats worse than the best one.
 pub const REACH: f64 = 15.0;
 /// Sequences with more walks through the map than this are not enumerated.
 const MOST_WALKS: usize = 2_000;
-/// By how much the probability of a place may be off.
+/// Tolerance of the probability of a place.
 const PLACE_TOLERANCE: f64 = 5e-3;
-/// One in the unit of probabilities.
+/// The number 1 in the unit of probabilities.
 const ONE: f64 = 65536.0;
 
-/// A filter, and all that it was told.
+/// A filter and its observations.
 pub struct Watched<const N: usize, const V: usize, const HISTORY: usize> {
     /// The filter.
     pub filter: Box<RobustFilter<N, V, HISTORY>>,
     config: RobustConfig,
     /// What the record holds, the oldest first.
     observations: Vec<Observation>,
-    /// The published path after the last place.
+    /// The path after the newest place.
     path: Vec<usize>,
     vertices: usize,
     /// Whether an observation left the record: then counts and evidence hold more than the record shows.
@@ -39,7 +39,7 @@ pub struct Watched<const N: usize, const V: usize, const HISTORY: usize> {
     pub tally: Tally,
 }
 
-/// How often something was held to the reference, and how often it was off in a way that is allowed to be rare.
+/// How often each comparison was made, and how often it failed in a way that may be rare.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Tally {
     /// Surplus and places were compared.
@@ -50,7 +50,7 @@ pub struct Tally {
     pub stale: u32,
     /// The worst n-gram was searched.
     pub searched: u32,
-    /// The core found an n-gram that is not quite the worst: it looks at sixteen.
+    /// The core found an n-gram that is not the worst: it considers sixteen.
     pub overlooked: u32,
 }
 
@@ -65,7 +65,7 @@ impl std::ops::AddAssign for Tally {
 }
 
 impl<const N: usize, const V: usize, const HISTORY: usize> Watched<N, V, HISTORY> {
-    /// A filter that was just started.
+    /// Starts a filter.
     pub fn new(config: RobustConfig, seed: u64) -> Self {
         let mut filter = Box::new(RobustFilter::new());
         filter.start(config, seed).expect("the configurations of tests are in range");
@@ -81,7 +81,7 @@ impl<const N: usize, const V: usize, const HISTORY: usize> Watched<N, V, HISTORY
         }
     }
 
-    /// Takes the next place, and checks everything that can be checked then.
+    /// Observes the next place and makes all comparisons.
     pub fn observe(&mut self, observation: Observation) -> Update {
         self.observations.push(observation);
         let first = self.observations.len().saturating_sub(HISTORY);
@@ -139,7 +139,7 @@ impl<const N: usize, const V: usize, const HISTORY: usize> Watched<N, V, HISTORY
         assert!(self.filter.map_probability_q16() > 0);
     }
 
-    /// The map is what the path says.
+    /// Asserts that the map follows from the path.
     fn check_map(&self, path: &[usize], update: &Update) {
         let observations = self.seen();
         let weighed = Weighed { observations: &observations, path, noise: self.noise() };
@@ -179,7 +179,7 @@ impl<const N: usize, const V: usize, const HISTORY: usize> Watched<N, V, HISTORY
         self.tally.stale += u32::from(!most.places.iter().enumerate().all(is_right));
     }
 
-    /// A vertex is known by the same number as long as it is the same.
+    /// Asserts that a vertex keeps its id as long as its visits stay together.
     fn check_names(&self, path: &[usize]) {
         let vertices = self.filter.map().vertices().len();
         let shared = || self.path.iter().copied().zip(path.iter().copied());
