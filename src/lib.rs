@@ -148,14 +148,15 @@ pub mod ring;
 #[cfg(feature = "wire")]
 pub mod robot;
 mod setters;
+mod top_k;
 #[cfg(feature = "wire")]
 pub mod wire;
 
 pub use config_error::ConfigError;
 pub use fault::{FaultCounters, FaultKind};
 pub use filter::{
-    Config, Consistency, Direction, Evidence, Filter, FilterCapacities, History, Ngram, NgramError, NgramLength,
-    NgramTable, NgramsFull, Observation, PaperFactors, PaperFilter, Particle, Prior, RobustConfig, RobustFactors,
+    Consistency, Direction, Evidence, Filter, FilterCapacities, History, Ngram, NgramError, NgramLength, NgramTable,
+    NgramsFull, Observation, PaperConfig, PaperFactors, PaperFilter, Particle, Prior, RobustConfig, RobustFactors,
     RobustFilter, Turn, Update, WeightFactors, WorstNgram,
 };
 pub use map::{Map, PerVertex, VertexId, VertexSet, VerticesFull};
