@@ -1,6 +1,6 @@
 //! The robust filter in a snapshot: everything that cannot be recomputed from the places and the paths.
 //!
-//! Of a hypothesis a snapshot has the path and the counts of places that left the history; map, counts and evidence are
+//! Of a hypothesis a snapshot has the path and the marginalised statistics; map, statistics and evidence are
 //! recomputed. Saving recomputes them in the running filter too, so that it and a restored one are equal, bit for bit.
 
 mod hypothesis;
