@@ -5,7 +5,7 @@ use core::fmt;
 /// A setting is invalid.
 ///
 /// ```
-/// use toposlam::{ConfigError, RobustConfig, RobustFilter};
+/// use toposlam::{ConfigError, Filter, RobustConfig, RobustFilter};
 ///
 /// let mut config = RobustConfig::DEFAULT;
 /// config.noise_mm = 2000;

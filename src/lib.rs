@@ -123,7 +123,7 @@
 //! | Eq. 6, the weight | `filter/paper/particle.rs` |
 //! | Eq. 7 to 9, its factors | `filter/paper/likelihood.rs` |
 //! | Section III.B, localisation | `filter/mod.rs` ([`Update::vertex`]) |
-//! | Eq. 2, the half from history to map, with its n-gram | `filter/robust/worst.rs` |
+//! | Eq. 2, the half from history to map, with its n-gram | `filter/robust/worst_ngram.rs` |
 //! | Section IV.A, meet points | `place/` |
 #![cfg_attr(not(test), no_std)]
 #![forbid(unsafe_code)]
@@ -148,14 +148,15 @@ pub mod ring;
 #[cfg(feature = "wire")]
 pub mod robot;
 mod setters;
+mod top_k;
 #[cfg(feature = "wire")]
 pub mod wire;
 
 pub use config_error::ConfigError;
 pub use fault::{FaultCounters, FaultKind};
 pub use filter::{
-    Config, Consistency, Direction, Evidence, Filter, FilterCapacities, History, Ngram, NgramError, NgramLength,
-    NgramTable, NgramsFull, Observation, PaperFactors, PaperFilter, Particle, Prior, RobustConfig, RobustFactors,
+    Consistency, Direction, Evidence, Filter, FilterCapacities, History, Ngram, NgramError, NgramLength, NgramTable,
+    NgramsFull, Observation, PaperConfig, PaperFactors, PaperFilter, Particle, Prior, RobustConfig, RobustFactors,
     RobustFilter, Turn, Update, WeightFactors, WorstNgram,
 };
 pub use map::{Map, PerVertex, VertexId, VertexSet, VerticesFull};

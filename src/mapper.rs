@@ -111,7 +111,7 @@ impl<const SONARS: usize, const V: usize, F: Filter<V>> Mapper<SONARS, V, F> {
         let most = if self.filter.is_in_doubt() { REFINEMENT_STEPS_IN_DOUBT } else { REFINEMENT_STEPS };
         if self.refinement_steps < most {
             self.refinement_steps += 1;
-            self.filter.polish();
+            self.filter.refine();
         }
         None
     }

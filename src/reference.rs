@@ -17,7 +17,7 @@
 #[cfg(feature = "wire")]
 use crate::robot::{Robot, RobotConfig};
 use crate::{
-    Config, Direction, Mapper, MapperConfig, PaperFilter, RobustConfig, RobustFilter, place::PlaceConfig,
+    Direction, Mapper, MapperConfig, PaperConfig, PaperFilter, RobustConfig, RobustFilter, place::PlaceConfig,
     place::PlaceDetector, ring::RingGeometry,
 };
 
@@ -74,7 +74,7 @@ pub const PAPER_HISTORY_WORDS: usize = 8;
 /// The settings of the paper's filter: the defaults, with the half of Eq. 2 from the history to the map. While the robot
 /// explores, the other half penalises the map for corridors that were not driven yet; it also costs several times as much
 /// (`docs/costs.md`).
-pub const PAPER_FILTER: Config = Config { direction: Direction::HistoryToMap, ..Config::DEFAULT };
+pub const PAPER_FILTER: PaperConfig = PaperConfig { direction: Direction::HistoryToMap, ..PaperConfig::DEFAULT };
 /// The paper's filter in place of the robust one.
 pub type PaperReference = PaperFilter<PAPER_PARTICLES, VERTICES, PAPER_HISTORY_WORDS>;
 

@@ -16,7 +16,7 @@ use toposlam::reference::{PLACE, RING, SONARS};
 use toposlam::wire::{
     Chunk, Command, Inbox, Info, Outcome, Refusal, Request, ResetCause, Setting, Settings, Staging, Version, crc32,
 };
-use toposlam::{FaultKind, RobustFilter};
+use toposlam::{FaultKind, Filter, RobustFilter};
 use toposlam_fuzz::filters::{self, CONFIG, HYPOTHESES, Small};
 use toposlam_fuzz::line::{Line, Piece, damage};
 

@@ -5,6 +5,7 @@ use std::sync::LazyLock;
 
 use arbitrary::Arbitrary;
 use libfuzzer_sys::fuzz_target;
+use toposlam::Filter;
 use toposlam::persist::Persist;
 use toposlam::persist::snapshot::{FILTER_SECTION, SNAPSHOT_VERSION, SnapshotError, Writer};
 use toposlam::wire::crc32;
@@ -181,8 +182,8 @@ fn goes_on(filter: &mut Small, then: &[Then]) {
                 assert_eq!(twin.observe(seen.observation()), update, "the restored filter does as the saved one does");
             }
             Then::Polish => {
-                filter.polish();
-                twin.polish();
+                filter.refine();
+                twin.refine();
             }
             Then::LocaliseOnly(on) => {
                 filter.set_localise_only(on);

@@ -2,7 +2,7 @@
 
 use arbitrary::Arbitrary;
 use toposlam::persist::snapshot::{FILTER_SECTION, Reader, Snapshot, SnapshotError, Writer};
-use toposlam::{Fingerprint, Map, Observation, RobustConfig, RobustFilter, Turn, Update, VertexId};
+use toposlam::{Filter, Fingerprint, Map, Observation, RobustConfig, RobustFilter, Turn, Update, VertexId};
 
 /// The most hypotheses of a [`Small`] filter.
 pub const HYPOTHESES: usize = 4;
@@ -61,7 +61,7 @@ pub fn after(places: usize) -> Box<Small> {
     filter.start(CONFIG, 1).unwrap();
     for index in 0..places {
         filter.observe(walk(index));
-        (0..index % 4).for_each(|_| filter.polish());
+        (0..index % 4).for_each(|_| filter.refine());
     }
     filter
 }
@@ -123,8 +123,8 @@ pub fn check(filter: &Small, update: &Update) {
         return;
     }
     for vertex in VertexId::first(VertexId::LIMIT) {
-        assert!(filter.renamed(vertex).is_none_or(is_vertex));
-        assert!(filter.place_probability_q16(vertex) <= 65_600);
+        assert!(filter.remapped(vertex).is_none_or(is_vertex));
+        assert!(filter.vertex_probability_q16(vertex) <= 65_600);
     }
     assert_eq!(filter.path().last(), Some(update.vertex));
     assert!(filter.worst().walk().iter().copied().all(is_vertex));

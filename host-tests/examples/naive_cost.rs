@@ -13,7 +13,7 @@ use std::collections::VecDeque;
 use std::process::exit;
 
 use toposlam::reference::{self, PAPER_HISTORY_WORDS, PAPER_PARTICLES, PaperReference, VERTICES};
-use toposlam::{Direction, Fingerprint, History, Map, Particle, VertexId};
+use toposlam::{Direction, Filter, Fingerprint, History, Map, Particle, VertexId};
 use toposlam_host_tests::graph::Graph;
 use toposlam_host_tests::ngram::{grams_of_graph, grams_of_history};
 

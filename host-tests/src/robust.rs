@@ -35,8 +35,8 @@ pub struct Observation {
     pub turned_back: Option<bool>,
     /// How many ways the robot counted, 1 to 7.
     pub degree: Option<usize>,
-    /// Whether a new sequence begins here.
-    pub begins: bool,
+    /// Whether a new sequence starts here.
+    pub starts_sequence: bool,
 }
 
 /// The noise of what is observed.
@@ -56,7 +56,7 @@ pub type Path = [usize];
 /// Observations, the vertex of each, and the noise: what is weighed.
 #[derive(Clone, Copy, Debug)]
 pub struct Weighed<'a> {
-    /// What was observed; the first observation begins a sequence.
+    /// What was observed; the first observation starts a sequence.
     pub observations: &'a [Observation],
     /// The vertex of each observation.
     pub path: &'a Path,
@@ -144,7 +144,7 @@ impl Weighed<'_> {
 
     /// Every edge once, the smaller vertex first, in ascending order.
     pub fn edges(&self) -> BTreeSet<(usize, usize)> {
-        let follows = |at: &usize| !self.observations[*at].begins;
+        let follows = |at: &usize| !self.observations[*at].starts_sequence;
         let edge = |at: usize| (self.path[at - 1].min(self.path[at]), self.path[at - 1].max(self.path[at]));
         (1..self.path.len()).filter(follows).map(edge).collect()
     }
@@ -154,7 +154,7 @@ impl Weighed<'_> {
         for (at, (seen, &vertex)) in self.observations.iter().zip(self.path).enumerate() {
             vertices[vertex].labels.push(seen.label);
             vertices[vertex].degrees.extend(seen.degree);
-            if !seen.begins {
+            if !seen.starts_sequence {
                 vertices[self.path[at - 1]].exits += 1;
             }
         }
@@ -177,7 +177,7 @@ impl Weighed<'_> {
             ln_labels(&vertex.labels, self.noise.deviation)
                 + ln_exits(vertex.exits, vertex.neighbours.len(), &vertex.degrees, self.noise)
         };
-        let sequences = self.observations.iter().filter(|seen| seen.begins).count() as f64;
+        let sequences = self.observations.iter().filter(|seen| seen.starts_sequence).count() as f64;
         let size = vertices.len() as f64;
         vertices.iter().map(of_vertex).sum::<f64>() + self.ln_turns(self.path, 0)
             - sequences * size.ln()
@@ -185,11 +185,11 @@ impl Weighed<'_> {
             - EDGE * self.edges().len() as f64
     }
 
-    /// ln of the probability of all that was said about turns along a path that begins at an observation. Of the first two
+    /// ln of the probability of all that was said about turns along a path that starts at an observation. Of the first two
     /// places of a sequence nothing can be said.
     fn ln_turns(&self, path: &Path, first: usize) -> f64 {
-        let begins = |at: usize| self.observations[first + at].begins;
-        let is_told = |at: &usize| !begins(*at) && !begins(at - 1);
+        let starts = |at: usize| self.observations[first + at].starts_sequence;
+        let is_told = |at: &usize| !starts(*at) && !starts(at - 1);
         let ln = |at: usize| {
             ln_turn(self.observations[first + at].turned_back, path[at] == path[at - 2], self.noise.wrong_turn)
         };
@@ -198,7 +198,7 @@ impl Weighed<'_> {
 
     /// The other paths: every walk through the map for each sequence, by enumeration.
     ///
-    /// A path begins a sequence at any of the `K` vertices, leaves each vertex by one of its ways, the most likely number
+    /// A path starts a sequence at any of the `K` vertices, leaves each vertex by one of its ways, the most likely number
     /// of them, and explains each label at its vertex by the expectation of the logarithm of its density under what the
     /// path that is weighed says of the vertex. With `n` labels of mean `m`, shape `a' = a + (n-1)/2` and scale
     /// `b' = b + SS/2` that is, up to what all have in common,
@@ -256,11 +256,11 @@ impl Weighed<'_> {
         Some(result)
     }
 
-    /// Where each sequence begins, and how many places it has.
+    /// Where each sequence starts, and how many places it has.
     pub fn sequences(&self) -> Vec<(usize, usize)> {
-        let mut begins: Vec<usize> = (0..self.path.len()).filter(|&at| self.observations[at].begins).collect();
-        begins.push(self.path.len());
-        begins.windows(2).map(|pair| (pair[0], pair[1] - pair[0])).collect()
+        let mut starts: Vec<usize> = (0..self.path.len()).filter(|&at| self.observations[at].starts_sequence).collect();
+        starts.push(self.path.len());
+        starts.windows(2).map(|pair| (pair[0], pair[1] - pair[0])).collect()
     }
 }
 
@@ -328,7 +328,8 @@ mod tests {
     const NOISE: Noise = Noise { deviation: 10.0, wrong_turn: 0.02, wrong_degree: 0.1 };
 
     fn seen(labels: &[f64]) -> Vec<Observation> {
-        let observation = |(at, &label)| Observation { label, turned_back: None, degree: None, begins: at == 0 };
+        let observation =
+            |(at, &label)| Observation { label, turned_back: None, degree: None, starts_sequence: at == 0 };
         labels.iter().enumerate().map(observation).collect()
     }
 

@@ -5,16 +5,16 @@ mod common;
 
 use common::drive::{Drive, Evidence, Random, Tally, VERTICES};
 use common::fingerprint;
-use toposlam::{Config, Direction, FaultKind, PaperFilter};
+use toposlam::{Direction, FaultKind, Filter, PaperConfig, PaperFilter};
 
 const DIRECTIONS: [Direction; 3] = [Direction::TwoSided, Direction::MapToHistory, Direction::HistoryToMap];
 
 /// A random configuration with small n, so that the reference can enumerate.
-fn config(random: &mut Random, direction: Direction) -> Config {
+fn config(random: &mut Random, direction: Direction) -> PaperConfig {
     // Beyond a σ_l of 113 mm the core interpolates Eq. 9, which is coarse for a φ near 1.
     let (largest_sigma_label_mm, penalties_permille) =
         if random.below(2) == 0 { (113, [0, 100, 300, 900, 999]) } else { (300, [0, 50, 100, 200, 300]) };
-    Config::DEFAULT
+    PaperConfig::DEFAULT
         .with_ngram_length([2, 3, 3, 4, 5][random.below(5)])
         .with_particles(1 + random.below(10) as u8)
         .with_penalty_permille(penalties_permille[random.below(5)])
@@ -62,7 +62,7 @@ fn maps_too_far_from_the_evidence_to_tell_apart_are_drawn_by_the_other_factors()
     for seed in 0..150 {
         let mut random = Random(seed);
         let building = random.building(4);
-        let config = Config::DEFAULT
+        let config = PaperConfig::DEFAULT
             .with_ngram_length(3)
             .with_particles(10)
             .with_sigma_consistency_mm(1 + random.below(4) as u16)
@@ -81,7 +81,7 @@ fn maps_too_far_from_the_evidence_to_tell_apart_are_drawn_by_the_other_factors()
 fn an_empty_prior_leaves_the_choice_to_the_other_factors() {
     for (seed, direction) in (0..).zip(DIRECTIONS.into_iter().cycle().take(30)) {
         let mut random = Random(seed);
-        let config = Config::DEFAULT.with_ngram_length(3).with_direction(direction);
+        let config = PaperConfig::DEFAULT.with_ngram_length(3).with_direction(direction);
         let mut drive = Drive::new(config, &Evidence::Prior(Vec::new()));
         let building = random.building(4);
         for observation_mm in random.walk(&building, 10, 5) {
@@ -94,7 +94,7 @@ fn an_empty_prior_leaves_the_choice_to_the_other_factors() {
 fn long_n_grams_with_coarse_labels_agree() {
     for seed in 0..40 {
         let mut random = Random(seed);
-        let config = Config::DEFAULT
+        let config = PaperConfig::DEFAULT
             .with_ngram_length(6 + random.below(2) as u8)
             .with_particles(5)
             .with_direction(DIRECTIONS[seed as usize % 3]);
@@ -112,7 +112,8 @@ fn long_n_grams_with_coarse_labels_agree() {
 fn a_drive_longer_than_the_history_agrees_and_counts_what_was_dropped() {
     for (seed, direction) in (0..).zip(DIRECTIONS) {
         let mut random = Random(seed);
-        let mut drive = Drive::new(Config::DEFAULT.with_ngram_length(3).with_direction(direction), &Evidence::OnLine);
+        let mut drive =
+            Drive::new(PaperConfig::DEFAULT.with_ngram_length(3).with_direction(direction), &Evidence::OnLine);
         let building = random.building(4);
         for observation_mm in random.walk(&building, 45, 3) {
             drive.observe(observation_mm, &mut random);
@@ -125,7 +126,7 @@ fn a_drive_longer_than_the_history_agrees_and_counts_what_was_dropped() {
 fn a_map_without_room_for_a_new_vertex_is_reported_and_goes_on_with_what_it_has() {
     for (seed, direction) in (0..).zip(DIRECTIONS) {
         let mut random = Random(seed);
-        let config = Config::DEFAULT
+        let config = PaperConfig::DEFAULT
             .with_ngram_length(2)
             .with_penalty_permille(0)
             .with_sigma_label_mm(20)
@@ -143,7 +144,7 @@ fn a_map_without_room_for_a_new_vertex_is_reported_and_goes_on_with_what_it_has(
 fn a_map_of_one_vertex_pays_one_minus_phi_because_eq_9_includes_a_equal_b() {
     for penalty_permille in [0_u16, 1, 100, 500, 999] {
         let mut filter = PaperFilter::<1, 4, 1>::new();
-        filter.start(Config::DEFAULT.with_penalty_permille(penalty_permille).with_particles(1), 0).unwrap();
+        filter.start(PaperConfig::DEFAULT.with_penalty_permille(penalty_permille).with_particles(1), 0).unwrap();
         filter.observe(fingerprint(1200.0));
         let phi = f64::from(penalty_permille) / 1000.0;
         let of_core = f64::from(filter.best().factors.ln_size_q16) / 65536.0;
@@ -153,7 +154,7 @@ fn a_map_of_one_vertex_pays_one_minus_phi_because_eq_9_includes_a_equal_b() {
 
 /// Everything a filter tells about a drive of 40 places.
 fn told(filter: &mut PaperFilter<10, 16, 4>, seed: u64) -> Vec<String> {
-    filter.start(Config::DEFAULT.with_ngram_length(4), seed).unwrap();
+    filter.start(PaperConfig::DEFAULT.with_ngram_length(4), seed).unwrap();
     let mut random = Random(7);
     let building = random.building(5);
     let mut observe = |observation_mm| {

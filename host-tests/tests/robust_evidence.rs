@@ -4,7 +4,7 @@ mod common;
 
 use common::drive::Random;
 use common::watched::{Tally, Watched};
-use toposlam::{Fingerprint, Observation, RobustConfig, Turn};
+use toposlam::{Filter, Fingerprint, Observation, RobustConfig, Turn};
 use toposlam_host_tests::graph::Graph;
 
 /// What a drive tells besides fingerprints.
@@ -21,15 +21,15 @@ fn drive(random: &mut Random, building: &Graph, places: usize, noise_steps: usiz
     let mut walk: Vec<usize> = Vec::new();
     let mut begin = 0;
     let mut observe = |_| {
-        let begins = random.below(100) < told.carried_percent;
+        let starts_sequence = random.below(100) < told.carried_percent;
         let place = match walk.last() {
-            Some(&here) if !begins => {
+            Some(&here) if !starts_sequence => {
                 let ways: Vec<usize> = building.neighbours(here).iter().copied().collect();
                 ways[random.below(ways.len())]
             }
             _ => random.below(building.vertices()),
         };
-        if begins {
+        if starts_sequence {
             begin = walk.len();
         }
         walk.push(place);
@@ -43,7 +43,7 @@ fn drive(random: &mut Random, building: &Graph, places: usize, noise_steps: usiz
         let noise = random.below(2 * noise_steps + 1) as f64 - noise_steps as f64;
         let steps = building.label(place) / 2.0 + noise;
         let fingerprint = Fingerprint::from_steps(steps as u16).expect("labels of tests are in range");
-        Observation { fingerprint, turn, degree, starts_sequence: begins }
+        Observation { fingerprint, turn, degree, starts_sequence }
     };
     (0..places).map(&mut observe).collect()
 }
@@ -64,7 +64,7 @@ fn agree(drives: u64, most_places: usize, longest: usize, told: Told) {
         for observation in drive(&mut random, &building, longest, noise_steps, told) {
             watched.observe(observation);
             for _ in 0..random.below(4) {
-                watched.filter.polish();
+                watched.filter.refine();
             }
         }
         tally += watched.tally;

@@ -108,7 +108,7 @@ impl<const V: usize, const HISTORY: usize> RoutePlanner<V, HISTORY> {
         self.departures.arrive();
         self.places = self.places.saturating_add(1);
         if let (Goal::Vertex(target), GoalStatus::Active) = (self.goal, self.goal_status) {
-            match filter.renamed(target) {
+            match filter.remapped(target) {
                 Some(target) => self.goal = Goal::Vertex(target),
                 None => self.goal_status = GoalStatus::VertexRemoved,
             }
@@ -142,7 +142,7 @@ impl<const V: usize, const HISTORY: usize> RoutePlanner<V, HISTORY> {
         if self.goal_status != GoalStatus::Active {
             return;
         }
-        let is_reached = filter.recent(0) == Some(target) && filter.place_probability_q16(target) >= REACHED_Q16;
+        let is_reached = filter.recent(0) == Some(target) && filter.vertex_probability_q16(target) >= REACHED_Q16;
         if is_reached {
             self.goal_status = GoalStatus::Reached;
         } else if !filter.map().contains(target) {

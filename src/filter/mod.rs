@@ -8,7 +8,7 @@ pub(crate) mod robust;
 pub use interface::{Filter, FilterCapacities};
 pub use observation::{Observation, Turn};
 pub use paper::{
-    Config, Consistency, Direction, Evidence, History, Ngram, NgramError, NgramLength, NgramTable, NgramsFull,
+    Consistency, Direction, Evidence, History, Ngram, NgramError, NgramLength, NgramTable, NgramsFull, PaperConfig,
     PaperFilter, Particle, Prior,
 };
 pub use robust::{RobustConfig, RobustFilter};

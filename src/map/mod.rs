@@ -7,7 +7,7 @@ mod vertex_set;
 pub use per_vertex::PerVertex;
 pub use vertex::VertexId;
 pub use vertex_set::VertexSet;
-#[allow(unused_imports)]
+
 pub(crate) use vertex_set::VertexSet32;
 
 use crate::Fingerprint;
@@ -195,18 +195,6 @@ impl core::fmt::Display for VerticesFull {
 }
 
 impl core::error::Error for VerticesFull {}
-
-/// The numbers of the bits that are set in a row, ascending.
-pub(crate) fn bits(mut row: u64) -> impl Iterator<Item = u8> + Clone {
-    core::iter::from_fn(move || {
-        if row == 0 {
-            return None;
-        }
-        let bit = row.trailing_zeros() as u8;
-        row &= row - 1;
-        Some(bit)
-    })
-}
 
 #[cfg(test)]
 mod tests {

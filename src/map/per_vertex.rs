@@ -13,7 +13,12 @@ pub struct PerVertex<T, const V: usize>([T; V]);
 impl<T: Copy, const V: usize> PerVertex<T, V> {
     /// The same value for each vertex.
     pub const fn filled(value: T) -> Self {
-        Self([value; V])
+        Self::new([value; V])
+    }
+
+    /// Sets the value of each vertex.
+    pub fn fill(&mut self, value: T) {
+        self.0.fill(value);
     }
 }
 

@@ -37,6 +37,18 @@ macro_rules! vertex_set {
                 self.0.count_ones() as usize
             }
 
+            /// How many vertices of the set have a smaller number than a vertex.
+            pub const fn rank(self, vertex: VertexId) -> usize {
+                let below = (1 << (vertex.index() as u32 & ($word::BITS - 1))) - 1;
+                (self.0 & below).count_ones() as usize
+            }
+
+            /// The vertex with the smallest number that is not in the set; `None` when all are.
+            pub fn first_missing(self) -> Option<VertexId> {
+                let number = self.0.trailing_ones();
+                if number < $word::BITS { Some(VertexId::of_bit(number)) } else { None }
+            }
+
             /// Whether the set has no vertex.
             pub const fn is_empty(self) -> bool {
                 self.0 == 0

@@ -3,7 +3,8 @@
 pub use super::split_mix::Random;
 use super::{fingerprint, length};
 use toposlam::{
-    Config, Direction, FaultKind, Fingerprint, PaperFilter, Particle as CoreParticle, Prior, Update, WeightFactors,
+    Direction, FaultKind, Filter, Fingerprint, PaperConfig, PaperFilter, Particle as CoreParticle, Prior, Update,
+    WeightFactors,
 };
 use toposlam_host_tests::filter::{self, Candidate, Map, Parameters, Particle};
 use toposlam_host_tests::graph::Graph;
@@ -89,7 +90,7 @@ pub struct Tally {
 
 /// Both filters.
 pub struct Drive {
-    config: Config,
+    config: PaperConfig,
     parameters: Parameters,
     core: Box<PaperFilter<PARTICLES, VERTICES, WORDS>>,
     prior: Option<(Box<Prior<VERTICES, PRIOR_WORDS>>, NgramSet)>,
@@ -101,7 +102,7 @@ pub struct Drive {
 
 impl Drive {
     /// Starts both filters with one configuration.
-    pub fn new(config: Config, evidence: &Evidence) -> Self {
+    pub fn new(config: PaperConfig, evidence: &Evidence) -> Self {
         let n = usize::from(config.ngram_length);
         let parameters = Parameters {
             n,

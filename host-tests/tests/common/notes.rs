@@ -38,8 +38,8 @@ impl Filter<VERTICES> for Notes {
         Ok(())
     }
 
-    fn observe(&mut self, observation: Observation) -> Update {
-        self.observations.push(observation);
+    fn observe(&mut self, observation: impl Into<Observation>) -> Update {
+        self.observations.push(observation.into());
         Update {
             place_index: self.observations.len() as u32 - 1,
             vertex: VertexId::FIRST,
@@ -63,7 +63,7 @@ impl Filter<VERTICES> for Notes {
         None
     }
 
-    fn place_probability_q16(&self, _: VertexId) -> u32 {
+    fn vertex_probability_q16(&self, _: VertexId) -> u32 {
         0
     }
 
@@ -71,7 +71,7 @@ impl Filter<VERTICES> for Notes {
         0
     }
 
-    fn renamed(&self, before: VertexId) -> Option<VertexId> {
+    fn remapped(&self, before: VertexId) -> Option<VertexId> {
         Some(before)
     }
 

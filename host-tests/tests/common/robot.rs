@@ -2,7 +2,7 @@
 
 use super::drive::Random;
 use std::collections::BTreeSet;
-use toposlam::{Fingerprint, Observation, RobustFilter, Turn};
+use toposlam::{Filter, Fingerprint, Observation, RobustFilter, Turn};
 use toposlam_eval::{environment::Environment, equivalence::SmallestEquivalent, graph::Graph, score::score_map};
 
 /// The hints of the robot besides fingerprints, and how often they are missing or wrong.

@@ -1,7 +1,8 @@
 //! A robust filter whose results are compared with their definitions after every place.
 
 use toposlam::{
-    Consistency, Direction, Fingerprint, History, NgramLength, Observation, RobustConfig, RobustFilter, Turn, Update,
+    Consistency, Direction, Filter, Fingerprint, History, NgramLength, Observation, RobustConfig, RobustFilter, Turn,
+    Update,
 };
 use toposlam_host_tests::consistency::hausdorff;
 use toposlam_host_tests::graph::Graph;
@@ -112,13 +113,13 @@ impl<const N: usize, const V: usize, const HISTORY: usize> Watched<N, V, HISTORY
         self.vertices = self.filter.map().vertices().len();
     }
 
-    /// The observations as the reference reads them, of which the first begins a sequence.
+    /// The observations as the reference reads them, of which the first starts a sequence.
     fn seen(&self) -> Vec<robust::Observation> {
         let seen = |(at, observation): (usize, &Observation)| robust::Observation {
             label: f64::from(observation.fingerprint.steps()),
             turned_back: observation.turn.map(|turn| turn == Turn::Back),
             degree: observation.degree.filter(|&degree| degree > 0).map(|degree| usize::from(degree).min(7)),
-            begins: at == 0 || observation.starts_sequence,
+            starts_sequence: at == 0 || observation.starts_sequence,
         };
         self.observations.iter().enumerate().map(seen).collect()
     }
@@ -132,7 +133,7 @@ impl<const N: usize, const V: usize, const HISTORY: usize> Watched<N, V, HISTORY
     }
 
     fn check_probabilities(&mut self) {
-        let of_place = |vertex| f64::from(self.filter.place_probability_q16(vertex)) / ONE;
+        let of_place = |vertex| f64::from(self.filter.vertex_probability_q16(vertex)) / ONE;
         let sum: f64 = self.filter.map().vertices().map(of_place).sum();
         self.tally.stale += u32::from((sum - 1.0).abs() >= PROBABILITY_TOLERANCE);
         assert!(self.filter.map_probability_q16() <= ONE as u32);
@@ -174,7 +175,7 @@ impl<const N: usize, const V: usize, const HISTORY: usize> Watched<N, V, HISTORY
             self.tally.pruned += 1;
             return;
         }
-        let of_place = |vertex: usize| f64::from(self.filter.place_probability_q16(super::vertex(vertex))) / ONE;
+        let of_place = |vertex: usize| f64::from(self.filter.vertex_probability_q16(super::vertex(vertex))) / ONE;
         let is_right = |(vertex, place): (usize, &f64)| (of_place(vertex) - place).abs() < PLACE_TOLERANCE;
         self.tally.stale += u32::from(!most.places.iter().enumerate().all(is_right));
     }
@@ -184,7 +185,7 @@ impl<const N: usize, const V: usize, const HISTORY: usize> Watched<N, V, HISTORY
         let vertices = self.filter.map().vertices().len();
         let shared = || self.path.iter().copied().zip(path.iter().copied());
         for before in 0..V {
-            let renamed = self.filter.renamed(super::vertex(before)).map(usize::from);
+            let renamed = self.filter.remapped(super::vertex(before)).map(usize::from);
             assert!(renamed.is_none_or(|now| now < vertices), "{before} is now {renamed:?} of {vertices}");
             assert!(renamed.is_none() || before < self.vertices, "{before} was not there: {renamed:?}");
             let mut now: Vec<usize> = shared().filter(|&(was, _)| was == before).map(|(_, now)| now).collect();

@@ -66,7 +66,7 @@ fn a_robot_to_which_every_place_looks_alike_is_told_something_consistent() {
         let mut watched = Watched::<10, 6, 64>::new(RobustConfig::DEFAULT, 1);
         for radius_mm in radii_mm.into_iter().cycle().take(60) {
             watched.observe(seen(radius_mm));
-            watched.filter.polish();
+            watched.filter.refine();
         }
         println!("{name}: {} vertices", watched.filter.map().vertices().len());
         assert!((2..=3).contains(&watched.filter.map().vertices().len()), "{name}: a place is not its own neighbour");
@@ -78,7 +78,7 @@ fn a_robot_that_is_carried_to_every_place_has_a_map_without_edges() {
     let mut watched = Watched::<10, 6, 64>::new(RobustConfig::DEFAULT, 1);
     for radius_mm in [900, 1300, 1700].into_iter().cycle().take(45) {
         watched.observe(Observation { starts_sequence: true, ..seen(radius_mm) });
-        watched.filter.polish();
+        watched.filter.refine();
     }
     assert_eq!(watched.filter.map().vertices().len(), 3);
     assert_eq!(watched.filter.map().edges().count(), 0);
@@ -90,9 +90,9 @@ fn anything() -> impl Strategy<Value = Observation> {
         prop_oneof![4 => (0_u16..4, 0_u16..8).prop_map(|(kind, noise)| 400 + 50 * kind + noise), 1 => 0..=4094_u16];
     let turn = prop_oneof![2 => Just(None), 1 => Just(Some(Turn::Back)), 1 => Just(Some(Turn::On))];
     let degree = prop_oneof![2 => Just(None), 2 => (1_u8..5).prop_map(Some), 1 => any::<u8>().prop_map(Some)];
-    (steps, turn, degree, prop::bool::weighted(0.1)).prop_map(|(steps, turn, degree, begins)| {
+    (steps, turn, degree, prop::bool::weighted(0.1)).prop_map(|(steps, turn, degree, starts_sequence)| {
         let fingerprint = Fingerprint::from_steps(steps).unwrap();
-        Observation { fingerprint, turn, degree, starts_sequence: begins }
+        Observation { fingerprint, turn, degree, starts_sequence }
     })
 }
 
@@ -112,9 +112,9 @@ fn config() -> impl Strategy<Value = RobustConfig> {
 fn bears<const N: usize, const V: usize>(config: RobustConfig, observations: &[(Observation, u8)], seed: u64) {
     let config = config.with_hypotheses(N as u8);
     let mut watched = Watched::<N, V, 8>::new(config, seed);
-    for (observation, polish) in observations {
+    for (observation, refine) in observations {
         watched.observe(*observation);
-        (0..*polish).for_each(|_| watched.filter.polish());
+        (0..*refine).for_each(|_| watched.filter.refine());
     }
     // In the middle of it all the filter is told to keep its map.
     watched.filter.set_localise_only(true);
@@ -124,7 +124,7 @@ fn bears<const N: usize, const V: usize>(config: RobustConfig, observations: &[(
     watched.filter.set_localise_only(false);
     for (observation, _) in observations.iter().take(12) {
         watched.filter.observe(*observation);
-        watched.filter.polish();
+        watched.filter.refine();
     }
     assert!(watched.filter.path().all(|vertex| watched.filter.map().contains(vertex)));
 }

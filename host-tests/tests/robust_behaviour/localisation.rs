@@ -37,7 +37,7 @@ fn look_around(filter: &mut Localiser, robot: &mut Robot) {
 /// The vertex whose number is that of its place.
 fn is_found(filter: &Localiser, robot: &Robot) -> bool {
     let place = vertex(*robot.walk.last().unwrap());
-    f64::from(filter.place_probability_q16(place)) > 0.9 * 65536.0 && filter.path().last() == Some(place)
+    f64::from(filter.vertex_probability_q16(place)) > 0.9 * 65536.0 && filter.path().last() == Some(place)
 }
 
 /// After how many places the robot knows where it is, and is right.
@@ -140,7 +140,7 @@ fn a_robot_that_stops_localising_maps_on() {
         let new = Fingerprint::from_radius_mm(5000).unwrap();
         for _ in 0..8 {
             filter.observe(new);
-            (0..POLISH).for_each(|_| filter.polish());
+            (0..REFINEMENTS).for_each(|_| filter.refine());
             let back = environment.places()[*robot.walk.last().unwrap()].mean_mm as u16;
             filter.observe(Fingerprint::from_radius_mm(back).unwrap());
         }
@@ -155,7 +155,7 @@ fn a_map_that_is_kept_as_it_is_has_no_room_for_what_is_new() {
     let before = *filter.map();
     for radius_mm in [0, 8188, 5000, 1, 4000, 8188, 8188] {
         filter.observe(Fingerprint::from_radius_mm(radius_mm).unwrap());
-        filter.polish();
+        filter.refine();
     }
     assert!(filter.map().edges().eq(before.edges()) && filter.map().labels() == before.labels());
     assert_eq!(filter.faults().count(FaultKind::VerticesFull), 0);

@@ -11,12 +11,12 @@ use common::drive::Random;
 use common::environments::{easy, floor, ring_with_a_repeated_part, six_rooms};
 use common::robot::{Hints, Robot, TURNS};
 use common::vertex;
-use toposlam::{FaultKind, Fingerprint, Map, Observation, RobustConfig, RobustFilter, Turn, VertexId};
+use toposlam::{FaultKind, Filter, Fingerprint, Map, Observation, RobustConfig, RobustFilter, Turn, VertexId};
 use toposlam_eval::environment::Environment;
 use toposlam_eval::walk::all_walks;
 
 /// Moves in the time between two places.
-const POLISH: usize = 4;
+const REFINEMENTS: usize = 4;
 
 fn started<const N: usize, const V: usize, const HISTORY: usize>(seed: u64) -> Box<RobustFilter<N, V, HISTORY>> {
     let mut filter = Box::new(RobustFilter::new());
@@ -31,7 +31,7 @@ fn drive<const N: usize, const V: usize, const HISTORY: usize>(
 ) {
     for _ in 0..places {
         filter.observe(robot.step());
-        (0..POLISH).for_each(|_| filter.polish());
+        (0..REFINEMENTS).for_each(|_| filter.refine());
     }
 }
 
@@ -39,11 +39,11 @@ fn drive<const N: usize, const V: usize, const HISTORY: usize>(
 fn until_exact<const N: usize, const V: usize, const HISTORY: usize>(
     filter: &mut RobustFilter<N, V, HISTORY>,
     robot: &mut Robot,
-    (most, polish): (usize, usize),
+    (most, refine): (usize, usize),
 ) -> Option<usize> {
     (1..=most).find(|_| {
         filter.observe(robot.step());
-        (0..polish).for_each(|_| filter.polish());
+        (0..refine).for_each(|_| filter.refine());
         robot.is_mapped_by(filter)
     })
 }
@@ -56,7 +56,7 @@ fn exact_of_ten(environment: &Environment, hints: Hints, config: RobustConfig, p
         filter.start(config, seed).unwrap();
         for _ in 0..places {
             filter.observe(robot.step());
-            (0..POLISH).for_each(|_| filter.polish());
+            (0..REFINEMENTS).for_each(|_| filter.refine());
         }
         robot.is_mapped_by(&*filter)
     };
@@ -87,12 +87,12 @@ fn a_first_guess_at_the_noise_that_is_off_by_a_factor_of_two_gives_the_same_map(
 #[test]
 fn the_same_seed_and_input_give_the_same_result() {
     let environment = floor();
-    let told = |seed: u64, polish: usize| -> Vec<String> {
+    let told = |seed: u64, refine: usize| -> Vec<String> {
         let mut robot = Robot::new(&environment, TURNS, 9);
         let mut filter = started::<10, 16, 64>(seed);
         let mut observe = |_| {
             let update = filter.observe(robot.step());
-            (0..polish).for_each(|_| filter.polish());
+            (0..refine).for_each(|_| filter.refine());
             format!("{update:?} {:?} {:?} {:?}", filter.map(), filter.worst(), filter.evidence())
         };
         (0..100).map(&mut observe).collect()

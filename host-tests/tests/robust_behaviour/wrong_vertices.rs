@@ -23,7 +23,7 @@ fn mapped(robot: &mut Robot, seed: u64) -> Mapped {
 fn places_until_right_again(
     environment: &Environment,
     hints: Hints,
-    polish: usize,
+    refine: usize,
     mistake: impl Fn(&Robot, &[u8]) -> Vec<u8>,
 ) -> Vec<usize> {
     let recover = |seed: u64| {
@@ -32,7 +32,7 @@ fn places_until_right_again(
         let wrong: Vec<_> = mistake(&robot, &path).into_iter().map(|at| vertex(at.into())).collect();
         filter.assume_path(&wrong).expect("the mistake is a path");
         assert!(!robot.is_all_mapped_by(&*filter), "seed {seed}: the mistake was made");
-        until_exact(&mut filter, &mut robot, (200, polish)).unwrap_or(usize::MAX)
+        until_exact(&mut filter, &mut robot, (200, refine)).unwrap_or(usize::MAX)
     };
     (0..12).map(recover).collect()
 }
@@ -67,7 +67,7 @@ fn a_place_that_was_split_in_two_is_one_again_within_10_places() {
         };
         path.iter().map(alternate).collect()
     };
-    is_soon(&places_until_right_again(&six_rooms(), Hints::default(), POLISH, split), 10);
+    is_soon(&places_until_right_again(&six_rooms(), Hints::default(), REFINEMENTS, split), 10);
 }
 
 #[test]
@@ -76,7 +76,7 @@ fn two_look_alike_places_that_were_merged_are_two_again_within_20_places() {
         let [kept, gone] = [0, 3].map(|place| vertex_of(robot, path, place));
         closed(path.iter().map(|&at| if at == gone { kept } else { at }).collect())
     };
-    is_soon(&places_until_right_again(&six_rooms(), Hints::default(), POLISH, merge), 20);
+    is_soon(&places_until_right_again(&six_rooms(), Hints::default(), REFINEMENTS, merge), 20);
 }
 
 #[test]

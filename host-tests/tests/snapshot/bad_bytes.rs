@@ -5,6 +5,7 @@ use super::*;
 use proptest::collection::vec;
 use proptest::prelude::*;
 use std::sync::LazyLock;
+use toposlam::Filter;
 use toposlam::Turn;
 
 type Small = RobustFilter<3, 6, 12>;
@@ -43,7 +44,7 @@ fn goes_on(filter: &mut Small) {
         let update = filter.observe(observation);
         assert!(filter.map().vertices().len() <= 6 && update.vertex.index() < 6);
         assert!(filter.path().all(|vertex| vertex.index() < 6));
-        (0..3).for_each(|_| filter.polish());
+        (0..3).for_each(|_| filter.refine());
         if index % 13 == 12 {
             filter.set_localise_only(index % 2 == 0);
         }

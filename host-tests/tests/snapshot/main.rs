@@ -12,7 +12,7 @@ use common::robot::{Hints, Robot};
 use common::vertex;
 use toposlam::persist::Persist;
 use toposlam::persist::snapshot::{FILTER_SECTION, Reader, Snapshot, SnapshotError, Writer};
-use toposlam::{Fingerprint, Map, Observation, RobustConfig, RobustFilter, Update, VertexId};
+use toposlam::{Filter, Fingerprint, Map, Observation, RobustConfig, RobustFilter, Update, VertexId};
 
 /// A drive: settings of a filter, and what becomes of it.
 #[derive(Clone)]
@@ -21,7 +21,7 @@ struct Drive {
     config: RobustConfig,
     /// Whether the filter begins with a map.
     known: bool,
-    /// The robot visits, and the filter polishes so often behind each.
+    /// The robot visits, and the filter refines so often behind each.
     observations: Vec<(Observation, usize)>,
     /// From where to where the filter only localises.
     localise: Option<(usize, usize)>,
@@ -57,9 +57,9 @@ impl Drive {
         if let Some((from, until)) = self.localise {
             filter.set_localise_only((from..until).contains(&index));
         }
-        let (observation, polish) = self.observations[index];
+        let (observation, refine) = self.observations[index];
         let update = filter.observe(observation);
-        (0..polish).for_each(|_| filter.polish());
+        (0..refine).for_each(|_| filter.refine());
         (update, held(filter))
     }
 }
@@ -77,10 +77,10 @@ fn held<const N: usize, const V: usize, const T: usize>(filter: &RobustFilter<N,
     let map = filter.map();
     let vertices: Vec<_> = map
         .vertices()
-        .map(|vertex| (map.label(vertex), map.visits(vertex).min(512), filter.place_probability_q16(vertex)))
+        .map(|vertex| (map.label(vertex), map.visits(vertex).min(512), filter.vertex_probability_q16(vertex)))
         .collect();
     let edges: Vec<_> = map.edges().collect();
-    let renamed: Vec<_> = VertexId::first(V).map(|before| filter.renamed(before)).collect();
+    let renamed: Vec<_> = VertexId::first(V).map(|before| filter.remapped(before)).collect();
     let path: Vec<_> = filter.path().collect();
     let (evidence, surplus) = filter.evidence();
     let told = format!(

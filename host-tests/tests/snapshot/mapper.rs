@@ -38,12 +38,12 @@ fn begins_of(mapper: &Mapper<SONARS, VERTICES, Notes>) -> Vec<bool> {
 fn the_next_place_begins_a_sequence_when_the_robot_may_be_elsewhere() {
     let mut buffer = [0; 64];
     let length = started::<Notes>(5).snapshot(&mut buffer).unwrap();
-    for (resume, begins) in [(Resume::AtUnknownVertex, true), (Resume::InPlace, false)] {
+    for (resume, starts_sequence) in [(Resume::AtUnknownVertex, true), (Resume::InPlace, false)] {
         let mut mapper = started::<Notes>(9);
         mapper.restore(&buffer[..length], resume).unwrap();
         assert_eq!(mapper.filter().history, 5);
         drive(&mut mapper, &mut simulation(), 3);
-        assert_eq!(begins_of(&mapper), [begins, false, false]);
+        assert_eq!(begins_of(&mapper), [starts_sequence, false, false]);
     }
     // Refused bytes and a new start leave nothing behind.
     let mut mapper = started::<Notes>(9);

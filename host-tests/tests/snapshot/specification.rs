@@ -2,6 +2,7 @@
 
 use super::*;
 use std::collections::HashMap;
+use toposlam::Filter;
 use toposlam::persist::snapshot::SNAPSHOT_VERSION;
 
 const SPECIFICATION: &str = include_str!("../../../docs/snapshot.md");

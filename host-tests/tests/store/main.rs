@@ -11,7 +11,7 @@ use common::robot::{Hints, Robot};
 use toposlam::persist::snapshot::{Snapshot, Writer};
 use toposlam::persist::store::Store;
 use toposlam::wire::map_digest;
-use toposlam::{RobustConfig, reference};
+use toposlam::{Filter, RobustConfig, reference};
 use toposlam_sim::chip::FlashModel;
 
 /// The two last sectors of the reference robot's flash, and pages as an nRF52840 has them.
@@ -33,7 +33,7 @@ fn snapshots(places: usize, count: usize, every: usize) -> Vec<Vec<u8>> {
     for _ in 0..count {
         for _ in 0..every {
             filter.observe(robot.step());
-            filter.polish();
+            filter.refine();
         }
         let mut buffer = vec![0; reference::SNAPSHOT_BYTES];
         let mut writer = Writer::new(&mut buffer).unwrap();

@@ -60,7 +60,7 @@ impl<const V: usize> Filter<V> for Believer<V> {
         Ok(())
     }
 
-    fn observe(&mut self, _: Observation) -> Update {
+    fn observe(&mut self, _: impl Into<Observation>) -> Update {
         unreachable!("the tests change the map themselves")
     }
 
@@ -77,7 +77,7 @@ impl<const V: usize> Filter<V> for Believer<V> {
     }
 
     /// Two thirds for the location, the rest among the vertices beside it.
-    fn place_probability_q16(&self, vertex: VertexId) -> u32 {
+    fn vertex_probability_q16(&self, vertex: VertexId) -> u32 {
         match vertex.index().abs_diff(self.location.index()) {
             0 => 43_691,
             1 => 10_923,
@@ -89,7 +89,7 @@ impl<const V: usize> Filter<V> for Believer<V> {
         1 << 15
     }
 
-    fn renamed(&self, before: VertexId) -> Option<VertexId> {
+    fn remapped(&self, before: VertexId) -> Option<VertexId> {
         self.names.get(before.index()).copied().unwrap_or(Some(before))
     }
 

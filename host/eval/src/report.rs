@@ -8,7 +8,7 @@ use super::{
 };
 use serde::Serialize;
 use std::{collections::BTreeMap, fmt, time::Duration};
-use toposlam::{Config, Direction, RobustConfig};
+use toposlam::{Direction, PaperConfig, RobustConfig};
 
 /// The width of a bin of [`Row::consistency_bins`], in millimetres.
 pub const BIN_MM: u16 = 20;
@@ -97,7 +97,7 @@ impl SettingsReport {
 impl From<Filter> for FilterReport {
     fn from(filter: Filter) -> Self {
         match filter {
-            Filter::Paper(Config {
+            Filter::Paper(PaperConfig {
                 particles,
                 penalty_permille,
                 sigma_label_mm,

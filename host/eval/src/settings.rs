@@ -2,7 +2,7 @@
 
 use super::{hints::Hints, prior::PriorSource};
 use std::fmt;
-use toposlam::{Config, ConfigError, NgramLength, RobustConfig};
+use toposlam::{ConfigError, NgramLength, PaperConfig, RobustConfig};
 
 /// What to evaluate.
 #[derive(Clone, Debug, PartialEq)]
@@ -45,7 +45,7 @@ impl Settings {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Filter {
     /// The particle filter of the paper, Eq. 2 to 9.
-    Paper(Config),
+    Paper(PaperConfig),
     /// Distinct hypotheses with repair moves.
     Robust(RobustConfig),
 }

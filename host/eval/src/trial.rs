@@ -134,7 +134,7 @@ mod tests {
     use super::*;
     use crate::walk::all_walks;
     use std::path::Path;
-    use toposlam::{Config, NgramLength, RobustConfig};
+    use toposlam::{NgramLength, PaperConfig, RobustConfig};
 
     fn environment() -> Environment {
         Environment::load(&Path::new(env!("CARGO_MANIFEST_DIR")).join("environments/wean-surrogate-sd.toml")).unwrap()
@@ -171,8 +171,11 @@ mod tests {
         assert_eq!(first.0.len(), 40);
         for prior in [PriorSource::Path, PriorSource::Exploration] {
             assert_eq!(fingerprints(&settings(prior)), first);
-            let paper =
-                Settings { filter: Filter::Paper(Config::DEFAULT), hints: "none".parse().unwrap(), ..settings(prior) };
+            let paper = Settings {
+                filter: Filter::Paper(PaperConfig::DEFAULT),
+                hints: "none".parse().unwrap(),
+                ..settings(prior)
+            };
             assert_eq!(fingerprints(&paper), first);
         }
     }
@@ -185,8 +188,8 @@ mod tests {
             let trial = Trial::draw(&environment, &walks, &settings(prior), 3);
             assert_eq!((trial.mapped_before().len(), trial.places_before()), (count, 5 * count));
             for sequence in trial.ngrams.iter().chain([&trial.visits]) {
-                let begins = sequence.iter().map(|visit| visit.observation.starts_sequence);
-                assert!(begins.eq((0..sequence.len()).map(|step| step == 0)));
+                let starts = sequence.iter().map(|visit| visit.observation.starts_sequence);
+                assert!(starts.eq((0..sequence.len()).map(|step| step == 0)));
                 let turns = sequence.iter().map(|visit| visit.observation.turn.is_some());
                 assert!(turns.eq((0..sequence.len()).map(|step| step >= 2)));
             }
@@ -214,7 +217,7 @@ mod tests {
         let so_far = truth(&settings(PriorSource::None));
         assert!(so_far.graph.edges().len() < environment.graph().edges().len());
         assert_eq!(so_far.classes.len(), 12);
-        let paper = Settings { filter: Filter::Paper(Config::DEFAULT), ..settings(PriorSource::Exploration) };
+        let paper = Settings { filter: Filter::Paper(PaperConfig::DEFAULT), ..settings(PriorSource::Exploration) };
         assert_eq!(truth(&paper), so_far);
         let whole_path = truth(&settings(PriorSource::Path));
         assert!(whole_path.graph.edges().len() > so_far.graph.edges().len());

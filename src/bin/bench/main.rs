@@ -54,7 +54,7 @@ enum Filters {
 }
 
 type PlaceCosts = Costs<{ PLACES_MM.len() }>;
-type SliceCosts = Costs<{ SLICES * PLACES_MM.len() }>;
+type RefinementCosts = Costs<{ SLICES * PLACES_MM.len() }>;
 type FrameCosts = Costs<{ FRAMES_MM.len() }>;
 
 /// Refinement steps between two places. The robot runs one for each ring frame, some hundreds.
@@ -88,7 +88,7 @@ fn run<const V: usize, F: toposlam::Filter<V>>(
     filter: &mut F,
     config: F::Config,
     hints: Hints,
-    (costs, slices): (&mut PlaceCosts, &mut SliceCosts),
+    (costs, refinements): (&mut PlaceCosts, &mut RefinementCosts),
     mut then: impl FnMut(&F, &Update),
 ) {
     let Ok(()) = filter.start(config, reference::SEED) else { panic!() };
@@ -98,8 +98,8 @@ fn run<const V: usize, F: toposlam::Filter<V>>(
         costs.push(instructions);
         then(filter, &update);
         for _ in 0..SLICES {
-            let (instructions, ()) = clock.measure(|| filter.polish());
-            slices.push(instructions);
+            let (instructions, ()) = clock.measure(|| filter.refine());
+            refinements.push(instructions);
         }
     }
 }
@@ -228,7 +228,7 @@ fn main() -> ! {
     static DETECTOR: ConstStaticCell<Detector> = ConstStaticCell::new(Detector::new());
     static REPORTER: ConstStaticCell<Reporter<VERTICES>> = ConstStaticCell::new(Reporter::new());
     static COSTS: ConstStaticCell<[PlaceCosts; 6]> = ConstStaticCell::new([const { PlaceCosts::new() }; 6]);
-    static SLICE_COSTS: ConstStaticCell<SliceCosts> = ConstStaticCell::new(Costs::new());
+    static REFINEMENT_COSTS: ConstStaticCell<RefinementCosts> = ConstStaticCell::new(Costs::new());
     static TURN_COSTS: ConstStaticCell<FrameCosts> = ConstStaticCell::new(Costs::new());
     static SNAPSHOT: ConstStaticCell<[u8; SNAPSHOT_BYTES]> = ConstStaticCell::new([0; SNAPSHOT_BYTES]);
     static INBOX: ConstStaticCell<Inbox> = ConstStaticCell::new(Inbox::new());
@@ -238,33 +238,33 @@ fn main() -> ! {
     let clock = &Clock::start(core.SYST);
     let (filters, detector_costs) = (FILTERS.take(), DETECTOR_COSTS.take());
     let [turn_costs, costs, both_costs, large_costs, paper_costs, report_costs] = COSTS.take();
-    let slices = SLICE_COSTS.take();
+    let refinements = REFINEMENT_COSTS.take();
     let mut wire = Wire { reporter: REPORTER.take(), encoder: Encoder::new(0), costs: report_costs, largest_bytes: 0 };
     let capacities = Capacities::new(VERTICES as u8, Filter::capacities(&reference::FILTER), SONARS as u8);
     wire.reporter.start(Hello::new(0, ResetCause::Unknown, reference::SEED, capacities), u16::MAX);
 
     let places_detected = detect(clock, DETECTOR.take(), detector_costs);
     if let Filters::Robot(filter) = filters {
-        run(clock, filter, reference::FILTER, Hints::Radius, (costs, slices), |_, _| {});
-        slices.print("robust_instructions_per_slice");
-        run(clock, filter, reference::FILTER, Hints::Turn, (turn_costs, slices), |_, _| {});
-        slices.print("robust_turn_instructions_per_slice");
+        run(clock, filter, reference::FILTER, Hints::Radius, (costs, refinements), |_, _| {});
+        refinements.print("robust_instructions_per_refinement");
+        run(clock, filter, reference::FILTER, Hints::Turn, (turn_costs, refinements), |_, _| {});
+        refinements.print("robust_turn_instructions_per_refinement");
         let report = |filter: &Filter, update: &Update| wire.report(clock, filter, update);
-        run(clock, filter, reference::FILTER, Hints::TurnAndDegree, (both_costs, slices), report);
-        slices.print("robust_both_instructions_per_slice");
+        run(clock, filter, reference::FILTER, Hints::TurnAndDegree, (both_costs, refinements), report);
+        refinements.print("robust_both_instructions_per_refinement");
         let (instructions, bytes) = save(clock, filter, SNAPSHOT.take());
         hprintln!("snapshot_instructions: {}", instructions);
         hprintln!("snapshot_bytes: {}", bytes);
     }
     *filters = const { Filters::Paper(PaperReference::new()) };
     if let Filters::Paper(filter) = filters {
-        run(clock, filter, reference::PAPER_FILTER, Hints::Radius, (paper_costs, slices), |_, _| {});
+        run(clock, filter, reference::PAPER_FILTER, Hints::Radius, (paper_costs, refinements), |_, _| {});
     }
     // Measured here, before the larger filter, sorting and formatting use more stack than the robot does.
     let stack_bytes = shared::stack_high_water_bytes();
     *filters = const { Filters::Large(LargeFilter::new()) };
     if let Filters::Large(filter) = filters {
-        run(clock, filter, LARGE_FILTER, Hints::Turn, (large_costs, slices), |_, _| {});
+        run(clock, filter, LARGE_FILTER, Hints::Turn, (large_costs, refinements), |_, _| {});
     }
 
     hprintln!("places: {}", PLACES_MM.len());

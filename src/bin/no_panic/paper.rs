@@ -4,8 +4,8 @@ use core::hint::black_box;
 
 use static_cell::ConstStaticCell;
 use toposlam::{
-    Config, ConfigError, Consistency, Direction, Fingerprint, History, Map, Ngram, NgramError, NgramLength, NgramTable,
-    NgramsFull, PaperFilter, Prior,
+    ConfigError, Consistency, Direction, Filter, Fingerprint, History, Map, Ngram, NgramError, NgramLength, NgramTable,
+    NgramsFull, PaperConfig, PaperFilter, Prior,
 };
 
 use super::any::{Opaque, any_fingerprint, any_length, show};
@@ -76,7 +76,7 @@ pub(crate) fn filter() {
     static PRIOR: ConstStaticCell<Prior<VERTICES, WORDS>> = ConstStaticCell::new(Prior::new(NgramLength::MIN));
     let Some(filter) = FILTER.try_take() else { return };
     let Some(prior) = PRIOR.try_take() else { return };
-    if let Err(error) = filter.start(Config::default().opaque(), black_box(1)) {
+    if let Err(error) = filter.start(PaperConfig::default().opaque(), black_box(1)) {
         show::<ConfigError>(error);
     }
     black_box(prior.ngrams());
@@ -86,9 +86,7 @@ pub(crate) fn filter() {
     for _ in 0..black_box(3) {
         let update = filter.observe(any_fingerprint());
         black_box(update.factors.ln_weight_q16());
-        black_box(filter.observe_with_draws(any_fingerprint(), || black_box(7)));
         black_box(filter.observe_with_prior(any_fingerprint(), prior));
-        black_box(filter.observe_with_prior_and_draws(any_fingerprint(), prior, || black_box(7)));
         black_box(prior.extend(filter.history()).is_ok());
     }
     black_box((filter.best(), filter.particles(), filter.observed(), filter.faults(), filter.config(), filter.map()));

@@ -4,7 +4,7 @@ use core::hint::black_box;
 
 use static_cell::ConstStaticCell;
 use toposlam::{
-    ConfigError, Observation, RobustConfig, RobustFilter,
+    ConfigError, Filter, Observation, RobustConfig, RobustFilter,
     persist::Persist,
     persist::snapshot::{FILTER_SECTION, Snapshot, Writer},
 };
@@ -31,17 +31,16 @@ pub(crate) fn robust<const N: usize, const V: usize, const HISTORY: usize>(filte
             starts_sequence: false,
         };
         black_box(filter.observe(observation.opaque()));
-        filter.polish();
+        filter.refine();
         filter.set_localise_only(black_box(true));
-        filter.polish();
+        filter.refine();
         black_box(filter.refresh());
-        black_box(filter.assume_path(&[any_vertex(); 3]));
     }
     let map = *filter.map();
     let restarted = filter.start_with_map(RobustConfig::default().opaque(), black_box(1), black_box(&map));
     let _ = black_box((restarted, filter.evidence(), filter.noise_mm()));
-    black_box((filter.map(), filter.observed(), filter.faults(), filter.renamed(any_vertex()), filter.worst()));
-    black_box((filter.place_probability_q16(any_vertex()), filter.map_probability_q16()));
+    black_box((filter.map(), filter.observed(), filter.faults(), filter.remapped(any_vertex()), filter.worst()));
+    black_box((filter.vertex_probability_q16(any_vertex()), filter.map_probability_q16()));
     for vertex in filter.path() {
         black_box(vertex);
     }

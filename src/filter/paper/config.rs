@@ -6,7 +6,7 @@ use crate::{ConfigError, Direction, NgramLength};
 /// The parameters of the paper's filter. The defaults are the paper's where it gives them.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
-pub struct Config {
+pub struct PaperConfig {
     /// `n`: how many labels an n-gram has, 2 to 7. Default 5 (Section IV).
     pub ngram_length: u8,
     /// `N`: how many particles represent the posterior, 1 to the filter's capacity. Default 10 (Section IV).
@@ -22,13 +22,13 @@ pub struct Config {
     pub direction: Direction,
 }
 
-impl Default for Config {
+impl Default for PaperConfig {
     fn default() -> Self {
         Self::DEFAULT
     }
 }
 
-impl Config {
+impl PaperConfig {
     setters! {
         with_ngram_length, ngram_length: u8;
         with_particles, particles: u8;
@@ -84,20 +84,20 @@ mod tests {
 
     #[test]
     fn the_defaults_are_valid() {
-        assert_eq!(Config::default().check(10).map(NgramLength::get), Ok(5));
+        assert_eq!(PaperConfig::default().check(10).map(NgramLength::get), Ok(5));
     }
 
     #[test]
     fn every_field_out_of_its_range_is_named() {
-        let default = Config::default();
+        let default = PaperConfig::default();
         for (config, field) in [
-            (Config { ngram_length: 1, ..default }, "ngram_length"),
-            (Config { ngram_length: 8, ..default }, "ngram_length"),
-            (Config { particles: 0, ..default }, "particles"),
-            (Config { particles: 11, ..default }, "particles"),
-            (Config { penalty_permille: 1000, ..default }, "penalty_permille"),
-            (Config { sigma_label_mm: 0, ..default }, "sigma_label_mm"),
-            (Config { sigma_consistency_mm: 8189, ..default }, "sigma_consistency_mm"),
+            (PaperConfig { ngram_length: 1, ..default }, "ngram_length"),
+            (PaperConfig { ngram_length: 8, ..default }, "ngram_length"),
+            (PaperConfig { particles: 0, ..default }, "particles"),
+            (PaperConfig { particles: 11, ..default }, "particles"),
+            (PaperConfig { penalty_permille: 1000, ..default }, "penalty_permille"),
+            (PaperConfig { sigma_label_mm: 0, ..default }, "sigma_label_mm"),
+            (PaperConfig { sigma_consistency_mm: 8189, ..default }, "sigma_consistency_mm"),
         ] {
             assert_eq!(config.check(10).unwrap_err().field(), field);
         }

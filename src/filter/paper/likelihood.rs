@@ -2,7 +2,7 @@
 //!
 //! A log weight is an `i32` in units of 2⁻¹⁶ nats, so that sums are exact, incremental and the same on every target.
 
-use crate::{Config, Fingerprint};
+use crate::{Fingerprint, PaperConfig};
 
 /// One nat in the unit of log weights.
 pub(crate) const NAT: i32 = 1 << 16;
@@ -34,7 +34,7 @@ impl Likelihood {
         }
     }
 
-    pub(crate) fn configure(&mut self, config: &Config) {
+    pub(crate) fn configure(&mut self, config: &PaperConfig) {
         self.label_scale = Scale::new(config.sigma_label_mm);
         self.consistency_scale = Scale::new(config.sigma_consistency_mm);
         let sigma_label_mm = f32::from(config.sigma_label_mm.max(1));
@@ -136,7 +136,7 @@ const LARGEST_LOSS: i32 = 4096 * NAT;
 mod tests {
     use super::*;
 
-    fn likelihood(config: Config) -> Likelihood {
+    fn likelihood(config: PaperConfig) -> Likelihood {
         let mut likelihood = Likelihood::new();
         likelihood.configure(&config);
         likelihood
@@ -159,7 +159,7 @@ mod tests {
     #[test]
     fn one_vertex_pays_the_penalty_of_its_likeness_to_itself() {
         for penalty_permille in [0, 100, 500, 999] {
-            let likelihood = likelihood(Config { penalty_permille, ..Config::DEFAULT });
+            let likelihood = likelihood(PaperConfig { penalty_permille, ..PaperConfig::DEFAULT });
             let expected = (1.0 - f64::from(penalty_permille) / 1000.0).ln();
             assert!((nats(ln_size(&likelihood, &[fingerprint(1000)])) - expected).abs() < 1e-4);
         }
@@ -167,7 +167,7 @@ mod tests {
 
     #[test]
     fn a_pair_of_vertices_counts_in_both_orders() {
-        let likelihood = likelihood(Config::DEFAULT);
+        let likelihood = likelihood(PaperConfig::DEFAULT);
         let (a, b) = (fingerprint(1000), fingerprint(1050));
         let pair = (1.0 - 0.1 * (-1_f64).exp()).ln();
         let expected = 2.0 * 0.9_f64.ln() + 2.0 * pair;
@@ -178,7 +178,7 @@ mod tests {
     fn the_size_changes_by_what_another_label_brings() {
         let labels = [1000, 1050, 1010, 3000].map(fingerprint);
         for sigma_label_mm in [20, 50, 300, 5000] {
-            let likelihood = likelihood(Config { sigma_label_mm, ..Config::DEFAULT });
+            let likelihood = likelihood(PaperConfig { sigma_label_mm, ..PaperConfig::DEFAULT });
             let moved = likelihood.ln_size_change(labels[1..].iter().copied(), Some(labels[0]), fingerprint(1036));
             let after = [fingerprint(1036), labels[1], labels[2], labels[3]];
             assert_eq!(ln_size(&likelihood, &labels) + moved, ln_size(&likelihood, &after));
@@ -188,7 +188,8 @@ mod tests {
     #[test]
     fn gaussian_factors_are_right_to_a_ten_thousandth_of_a_nat() {
         for sigma_mm in [2, 30, 70, 999] {
-            let config = Config { sigma_label_mm: sigma_mm, sigma_consistency_mm: sigma_mm, ..Config::DEFAULT };
+            let config =
+                PaperConfig { sigma_label_mm: sigma_mm, sigma_consistency_mm: sigma_mm, ..PaperConfig::DEFAULT };
             let likelihood = likelihood(config);
             for difference_mm in [0, 2, 18, 100, 998, 4000] {
                 let exact = -(f64::from(difference_mm) / f64::from(sigma_mm)).powi(2);
@@ -203,7 +204,7 @@ mod tests {
 
     #[test]
     fn beyond_its_reach_a_distance_loses_more_than_was_allowed() {
-        let likelihood = likelihood(Config::DEFAULT);
+        let likelihood = likelihood(PaperConfig::DEFAULT);
         for loss in [0, 1, NAT / 3, NAT, 15 * NAT, 300 * NAT] {
             let reach_mm = likelihood.consistency_reach_mm(loss);
             assert!(likelihood.ln_consistency(reach_mm) < -loss);

@@ -10,31 +10,33 @@ mod particles;
 mod prior;
 mod resample;
 mod selection;
+#[cfg(feature = "_test")]
+mod testing;
 
-pub use config::Config;
+pub use config::PaperConfig;
 pub use consistency::{Consistency, Direction, Evidence};
 pub use history::History;
 pub use ngram::{Ngram, NgramError, NgramLength, NgramTable, NgramsFull};
 pub use particle::Particle;
 pub use prior::Prior;
 
-use super::{Update, WeightFactors, draws};
-use crate::{ConfigError, FaultCounters, FaultKind, Fingerprint, Map};
+use super::{Filter, FilterCapacities, Update, WeightFactors, WorstNgram, draws};
+use crate::{ConfigError, FaultCounters, FaultKind, Fingerprint, Map, Observation, VertexId};
 use particles::{Particles, Step};
 use rand_core::Rng;
 
 /// The particle filter of the paper with at most `N` particles, maps of at most `V` vertices, and the newest
 /// `32 · WORDS` observations as evidence.
 ///
-/// The filter is const-constructed, so that a `static` of it lies in `.bss`, and set up in place by
-/// [`PaperFilter::start`]. Equal draws of one candidate are held once, with a multiplicity. Memory: about
+/// The filter is const-constructed, so that a `static` of it is in `.bss`, and initialised in place by
+/// [`Filter::start`]. Equal draws of one candidate are held once, with a multiplicity. Memory: about
 /// `2 · N · (18 · V + 32) + 8 · N · V + 44 · V · (WORDS + 1) + 120 · WORDS + 1500` bytes.
 ///
 /// ```
-/// use toposlam::{Config, Fingerprint, PaperFilter};
+/// use toposlam::{Filter, Fingerprint, PaperConfig, PaperFilter};
 ///
 /// let mut filter = PaperFilter::<10, 16, 8>::new();
-/// filter.start(Config::default(), 1)?;
+/// filter.start(PaperConfig::default(), 1)?;
 /// for radius_mm in [1200, 2200, 1200, 2200, 1200] {
 ///     filter.observe(Fingerprint::from_radius_mm(radius_mm)?);
 /// }
@@ -44,7 +46,7 @@ use rand_core::Rng;
 /// ```
 #[derive(Clone, Debug)]
 pub struct PaperFilter<const N: usize, const V: usize, const WORDS: usize> {
-    config: Config,
+    config: PaperConfig,
     seed: u64,
     observed: u32,
     particles: Particles<N, V>,
@@ -54,11 +56,11 @@ pub struct PaperFilter<const N: usize, const V: usize, const WORDS: usize> {
 }
 
 impl<const N: usize, const V: usize, const WORDS: usize> PaperFilter<N, V, WORDS> {
-    /// A filter that is yet to be set up by [`PaperFilter::start`]; before that, observations are lost.
+    /// A filter that ignores observations until [`Filter::start`].
     pub const fn new() -> Self {
         const { assert!(N >= 1 && N <= 255, "a filter has 1 to 255 particles") };
         Self {
-            config: Config::UNSET,
+            config: PaperConfig::UNSET,
             seed: 0,
             observed: 0,
             particles: Particles::new(),
@@ -68,55 +70,21 @@ impl<const N: usize, const V: usize, const WORDS: usize> PaperFilter<N, V, WORDS
         }
     }
 
-    /// Forgets everything and starts anew with a configuration and a seed.
-    ///
-    /// # Errors
-    /// [`ConfigError`] names the first field that is out of its range; the filter goes on as it was.
-    pub fn start(&mut self, config: Config, seed: u64) -> Result<(), ConfigError> {
-        config.check(N)?;
-        self.config = config;
-        self.seed = seed;
-        self.observed = 0;
-        self.particles.start(&config);
-        self.history.clear();
-        self.consistency.forget();
-        self.faults = FaultCounters::new();
-        Ok(())
-    }
-
-    /// Goes on with other settings.
-    ///
-    /// # Errors
-    /// As [`PaperFilter::start`].
-    pub fn set_config(&mut self, config: Config) -> Result<(), ConfigError> {
-        config.check(N)?;
-        self.config = config;
-        Ok(())
-    }
-
-    /// Takes the next place on line: Γ_env is what the filter's own history holds, this observation included.
-    ///
-    /// Cost: (particles) · (V + 1) predictions, of which some particles' worth need the distance of Eq. 2; at most all.
-    pub fn observe(&mut self, fingerprint: Fingerprint) -> Update {
-        let random = self.random();
-        self.observe_with_draws(fingerprint, random)
-    }
-
-    /// Takes the next place with Γ_env from an earlier exploration, as the paper assumes. The length of its n-grams is
-    /// that of the prior.
+    /// As [`Filter::observe`], with Γ_env from an earlier exploration, as the paper assumes. The length of its n-grams is that of
+    /// the prior.
     pub fn observe_with_prior<const PRIOR_WORDS: usize>(
         &mut self,
         fingerprint: Fingerprint,
         prior: &mut Prior<V, PRIOR_WORDS>,
     ) -> Update {
         let random = self.random();
-        self.observe_with_prior_and_draws(fingerprint, prior, random)
+        self.step_with_prior(fingerprint, prior, random)
     }
 
-    /// As [`PaperFilter::observe`], with the random draws given: for each particle in turn, one that proposes a
-    /// prediction and one that accepts or rejects it, until one is accepted. After 128 proposals all predictions are
-    /// weighed in full, and one draw chooses each particle that is still missing.
-    pub fn observe_with_draws(&mut self, fingerprint: Fingerprint, random: impl FnMut() -> u32) -> Update {
+    /// Takes the next place: Γ_env is what the history contains, this observation included. `random` gives the random draws:
+    /// for each particle in turn, one that proposes a prediction and one that accepts or rejects it, until one is accepted.
+    /// After 128 proposals all predictions are weighed in full, and one draw chooses each particle that is still missing.
+    fn step(&mut self, fingerprint: Fingerprint, random: impl FnMut() -> u32) -> Update {
         self.remember(fingerprint);
         let evidence = (&self.history, &mut self.consistency);
         let length = NgramLength::new(self.config.ngram_length).unwrap_or(NgramLength::MIN);
@@ -124,8 +92,8 @@ impl<const N: usize, const V: usize, const WORDS: usize> PaperFilter<N, V, WORDS
         self.finish(step)
     }
 
-    /// As [`PaperFilter::observe_with_prior`], with the random draws given as in [`PaperFilter::observe_with_draws`].
-    pub fn observe_with_prior_and_draws<const PRIOR_WORDS: usize>(
+    /// As [`PaperFilter::step`], with Γ_env from an earlier exploration.
+    fn step_with_prior<const PRIOR_WORDS: usize>(
         &mut self,
         fingerprint: Fingerprint,
         prior: &mut Prior<V, PRIOR_WORDS>,
@@ -137,7 +105,7 @@ impl<const N: usize, const V: usize, const WORDS: usize> PaperFilter<N, V, WORDS
         self.finish(step)
     }
 
-    /// The random draws for the next place.
+    /// The random draws of the next place.
     fn random(&self) -> impl FnMut() -> u32 + use<N, V, WORDS> {
         let mut random = draws(self.seed, self.observed.into());
         move || random.next_u32()
@@ -173,12 +141,12 @@ impl<const N: usize, const V: usize, const WORDS: usize> PaperFilter<N, V, WORDS
         update
     }
 
-    /// The particle with the largest weight among those that survived the last resampling.
+    /// The particle with the largest weight among those that the last resampling kept.
     pub fn best(&self) -> &Particle<V> {
         self.particles.best()
     }
 
-    /// The different particles, in the order of the pool they were drawn from.
+    /// The distinct particles, in the order of the pool they were drawn from.
     pub fn particles(&self) -> &[Particle<V>] {
         self.particles.all()
     }
@@ -193,19 +161,82 @@ impl<const N: usize, const V: usize, const WORDS: usize> PaperFilter<N, V, WORDS
         self.observed
     }
 
-    /// What went wrong since the start: full tables.
-    pub fn faults(&self) -> &FaultCounters {
+    /// The configuration in use.
+    pub fn config(&self) -> &PaperConfig {
+        &self.config
+    }
+}
+
+/// The paper's filter reads the fingerprint of an observation alone, and it does not refine. The best particle has one vertex, so
+/// its probability is 1. The probability of the map is the share of the draws that chose the best particle. The filter knows the
+/// newest vertex but no path. Vertices keep their ids within a particle; ids of different particles are unrelated, so no id is
+/// remapped. Of the worst n-gram it knows the distance alone.
+impl<const N: usize, const V: usize, const WORDS: usize> Filter<V> for PaperFilter<N, V, WORDS> {
+    type Config = PaperConfig;
+
+    const UNSTARTED: Self = Self::new();
+
+    fn capacities(config: &PaperConfig) -> FilterCapacities {
+        FilterCapacities {
+            hypotheses: config.particles.into(),
+            history: (32 * WORDS) as u16,
+            ngram_length: config.ngram_length,
+        }
+    }
+
+    fn start(&mut self, config: PaperConfig, seed: u64) -> Result<(), ConfigError> {
+        config.check(N)?;
+        self.config = config;
+        self.seed = seed;
+        self.observed = 0;
+        self.particles.start(&config);
+        self.history.clear();
+        self.consistency.forget();
+        self.faults = FaultCounters::new();
+        Ok(())
+    }
+
+    fn set_config(&mut self, config: PaperConfig) -> Result<(), ConfigError> {
+        config.check(N)?;
+        self.config = config;
+        Ok(())
+    }
+
+    /// Cost: (particles) · (V + 1) predictions, of which some particles' worth need the distance of Eq. 2; at most all.
+    fn observe(&mut self, observation: impl Into<Observation>) -> Update {
+        let observation = observation.into();
+        let random = self.random();
+        self.step(observation.fingerprint, random)
+    }
+
+    fn map(&self) -> &Map<V> {
+        &self.best().map
+    }
+
+    fn faults(&self) -> &FaultCounters {
         &self.faults
     }
 
-    /// The configuration in force.
-    pub fn config(&self) -> &Config {
-        &self.config
+    fn recent(&self, ago: usize) -> Option<VertexId> {
+        (self.observed > 0 && ago == 0).then(|| self.best().at)
     }
 
-    /// The best map.
-    pub fn map(&self) -> &Map<V> {
-        &self.best().map
+    fn vertex_probability_q16(&self, vertex: VertexId) -> u32 {
+        if self.observed > 0 && vertex == self.best().at { 1 << 16 } else { 0 }
+    }
+
+    fn map_probability_q16(&self) -> u32 {
+        let draws: u32 = self.particles().iter().map(|particle| u32::from(particle.multiplicity)).sum();
+        // All draws are those of one particle or more, so the share is 1 at most.
+        ((u32::from(self.best().multiplicity) << 16) / draws.max(1)).min(1 << 16)
+    }
+
+    fn remapped(&self, before: VertexId) -> Option<VertexId> {
+        self.map().contains(before).then_some(before)
+    }
+
+    fn worst(&self) -> WorstNgram {
+        WorstNgram { distance_mm: self.best().consistency_mm, ..WorstNgram::NONE }
     }
 }
 

@@ -6,7 +6,8 @@ use super::selection::{Candidate, Choice, Selection};
 use crate::filter::paper::consistency::{Consistency, Direction, Evidence};
 use crate::filter::paper::likelihood::Likelihood;
 use crate::map::PerVertex;
-use crate::{Config, Fingerprint, Map, NgramLength};
+use crate::top_k::insertion_sort;
+use crate::{Fingerprint, Map, NgramLength, PaperConfig};
 
 /// What a step tells besides the particles.
 pub(super) struct Step {
@@ -44,7 +45,7 @@ impl<const N: usize, const V: usize> Particles<N, V> {
     }
 
     /// One particle with an empty map stands for the state before the first place.
-    pub(super) fn start(&mut self, config: &Config) {
+    pub(super) fn start(&mut self, config: &PaperConfig) {
         self.likelihood.configure(config);
         self.wanted = config.particles;
         self.distinct = 0;
@@ -105,7 +106,7 @@ impl<const N: usize, const V: usize> Particles<N, V> {
         let mut heaviest: Option<(i32, Choice)> = None;
         let mut drawn = 0;
         // The children stand in the order of the pool: equal draws follow each other once they are sorted.
-        sort(chosen);
+        insertion_sort(chosen, |one, other| one <= other);
         let mut rest: &[Choice] = chosen;
         while let Some((&choice, _)) = rest.split_first() {
             let multiplicity = rest.iter().take_while(|&&other| other == choice).count();
@@ -128,20 +129,5 @@ impl<const N: usize, const V: usize> Particles<N, V> {
         self.current = !self.current;
         let vertices_full = parents.iter().any(|parent| parent.map.vertices().len() == V);
         Step { lead_q16: lead_q16.min(PROPOSAL_REACH), vertices_full }
-    }
-}
-
-/// Sorts a few choices; an insertion sort has no path that panics.
-fn sort(choices: &mut [Choice]) {
-    let mut sorted = 1;
-    while sorted < choices.len() {
-        for pair in (0..sorted).rev() {
-            if let Some([a, b]) = choices.get_mut(pair..pair + 2)
-                && *a > *b
-            {
-                core::mem::swap(a, b);
-            }
-        }
-        sorted += 1;
     }
 }

@@ -1,26 +1,30 @@
-//! The distinct hypotheses, ranked: growing them by one place, and taking in one that a move made.
+//! The beam: the best distinct hypotheses.
 
+use super::history::{ObservationHistory, PackedObservation};
 use super::hypothesis::Hypothesis;
-use super::prices::Prices;
-use super::record::{Entry, Record};
+use super::model::Model;
+use crate::map::VertexId;
+use crate::top_k::{TopK, insertion_sort};
 
-/// A hypothesis this far below the best one has no place even where there is room, in nats.
+/// A hypothesis this far below the best one is not kept even where there is room, in nats.
 const UNLIKELY: f32 = 1000.0;
 
-/// A hypothesis to be: a parent, and the vertex that its newest place is taken for.
+/// A prediction: that the newest observation of a hypothesis belongs to a vertex.
 #[derive(Clone, Copy, Debug)]
-struct Candidate {
+struct Prediction {
     score: f32,
     gain: f32,
     key: u32,
-    /// The slot of the parent.
+    /// The slot of the hypothesis.
     parent: u8,
-    vertex: u8,
+    vertex: VertexId,
 }
 
-const NONE: Candidate = Candidate { score: f32::NEG_INFINITY, gain: 0.0, key: 0, parent: 0, vertex: 0 };
+impl Prediction {
+    const NONE: Self = Self { score: f32::NEG_INFINITY, gain: 0.0, key: 0, parent: 0, vertex: VertexId::FIRST };
+}
 
-/// Up to `N` hypotheses of which no two have the same map and place.
+/// Up to `N` hypotheses, of which no two have the same map and vertex of the robot.
 #[derive(Clone, Debug)]
 pub(crate) struct Beam<const N: usize, const V: usize, const T: usize> {
     slots: [Hypothesis<V, T>; N],
@@ -31,10 +35,10 @@ pub(crate) struct Beam<const N: usize, const V: usize, const T: usize> {
 
 impl<const N: usize, const V: usize, const T: usize> Beam<N, V, T> {
     pub(crate) const fn new() -> Self {
-        Self { slots: [Hypothesis::NONE; N], order: [0; N], len: 0 }
+        Self { slots: [Hypothesis::EMPTY; N], order: [0; N], len: 0 }
     }
 
-    /// Begins with the hypothesis that knows nothing.
+    /// Starts with the empty hypothesis.
     pub(crate) fn clear(&mut self) {
         for (number, slot) in (0..).zip(&mut self.order) {
             *slot = number;
@@ -45,22 +49,22 @@ impl<const N: usize, const V: usize, const T: usize> Beam<N, V, T> {
         }
     }
 
-    /// Begins with one hypothesis.
-    pub(crate) fn begin_with(&mut self, hypothesis: &Hypothesis<V, T>) {
+    /// Starts with one hypothesis.
+    pub(crate) fn start_with(&mut self, hypothesis: &Hypothesis<V, T>) {
         self.clear();
         if let Some(first) = self.slots.first_mut() {
             first.clone_from(hypothesis);
         }
     }
 
-    /// Begins with no hypothesis, for those that are [appended](Beam::append).
+    /// Starts without a hypothesis, for those that are [appended](Beam::append).
     #[cfg(feature = "snapshot")]
-    pub(crate) fn begin_empty(&mut self) {
+    pub(crate) fn start_empty(&mut self) {
         self.clear();
         self.len = 0;
     }
 
-    /// Puts a hypothesis behind the others; one with the map and place of another, or without room, is left out.
+    /// Puts a hypothesis behind the others, unless there is no room or one with the same map and vertex of the robot.
     #[cfg(feature = "snapshot")]
     pub(crate) fn append(&mut self, hypothesis: &Hypothesis<V, T>) {
         let key = hypothesis.key();
@@ -72,25 +76,30 @@ impl<const N: usize, const V: usize, const T: usize> Beam<N, V, T> {
         }
     }
 
+    /// How many hypotheses there are.
     pub(crate) fn len(&self) -> usize {
         self.len
     }
 
+    /// The hypothesis of a rank, the best at 0.
     pub(crate) fn get(&self, rank: usize) -> Option<&Hypothesis<V, T>> {
         let slot = self.order.get(..self.len)?.get(rank)?;
         self.slots.get(usize::from(*slot))
     }
 
+    /// The hypothesis of a rank, the best at 0.
     pub(crate) fn get_mut(&mut self, rank: usize) -> Option<&mut Hypothesis<V, T>> {
         let slot = self.order.get(..self.len)?.get(rank)?;
         self.slots.get_mut(usize::from(*slot))
     }
 
+    /// The hypotheses, the best first.
     pub(crate) fn iter(&self) -> impl Iterator<Item = &Hypothesis<V, T>> {
         self.order.iter().take(self.len).filter_map(|&slot| self.slots.get(usize::from(slot)))
     }
 
-    pub(crate) fn each(&mut self, mut change: impl FnMut(&mut Hypothesis<V, T>)) {
+    /// Changes each hypothesis, the best first. [`Beam::sort`] restores the order.
+    pub(crate) fn for_each(&mut self, mut change: impl FnMut(&mut Hypothesis<V, T>)) {
         for &slot in self.order.iter().take(self.len) {
             if let Some(hypothesis) = self.slots.get_mut(usize::from(slot)) {
                 change(hypothesis);
@@ -98,12 +107,12 @@ impl<const N: usize, const V: usize, const T: usize> Beam<N, V, T> {
         }
     }
 
-    /// Forgets all hypotheses but the best one.
+    /// Drops all hypotheses but the best one.
     pub(crate) fn keep_best(&mut self) {
         self.len = self.len.min(1);
     }
 
-    /// The score that a new hypothesis has to exceed.
+    /// The score that a new hypothesis must exceed.
     pub(crate) fn threshold(&self, wanted: usize) -> f32 {
         let worst = self.get(self.len.saturating_sub(1)).filter(|_| self.len >= wanted.min(N));
         let best = self.get(0).map_or(f32::NEG_INFINITY, Hypothesis::score);
@@ -114,99 +123,93 @@ impl<const N: usize, const V: usize, const T: usize> Beam<N, V, T> {
     pub(crate) fn sort(&mut self) {
         let Self { slots, order, len } = self;
         let score = |slot: u8| slots.get(usize::from(slot)).map_or(f32::NEG_INFINITY, Hypothesis::score);
-        for end in 1..*len {
-            let mut rank = end;
-            while let (Some(&before), Some(&here)) = (order.get(rank.wrapping_sub(1)), order.get(rank)) {
-                if score(before) >= score(here) {
-                    break;
-                }
-                order.swap(rank - 1, rank);
-                rank -= 1;
-            }
-        }
+        insertion_sort(order.get_mut(..*len).unwrap_or(&mut []), |&one, &other| score(one) >= score(other));
     }
 
-    /// Takes the newest observation, number `index` of the record: of all predictions of all hypotheses the best `wanted`
-    /// distinct ones live on. When the map is `fixed` they differ in the place alone. Tells whether the best hypothesis
-    /// would have had another vertex if there had been room. Cost: O(N · V) predictions.
+    /// Adds the newest observation, number `index` of the history: the best `wanted` distinct predictions of all hypotheses
+    /// become the hypotheses. When the map is `fixed` they differ in the vertex of the robot alone. Returns whether the best
+    /// prediction had no room for its vertex. Cost: O(N · V) predictions.
     pub(crate) fn grow(
         &mut self,
-        prices: &Prices,
-        record: &Record<T>,
-        (index, entry): (usize, Entry),
+        model: &Model,
+        history: &ObservationHistory<T>,
+        newest: (usize, PackedObservation),
         wanted: usize,
         fixed: bool,
     ) -> bool {
-        let mut chosen = [NONE; N];
-        let mut count = 0;
-        let wanted = wanted.min(N);
-        let mut missed = f32::NEG_INFINITY;
+        let mut chosen = TopK::<Prediction, N>::new(Prediction::NONE);
+        let mut without_room = f32::NEG_INFINITY;
         for &slot in self.order.iter().take(self.len) {
             let Some(parent) = self.slots.get(usize::from(slot)) else { continue };
-            let vertices = if fixed { parent.vertices } else { parent.vertices + 1 };
-            for vertex in 0..vertices {
-                // A place is never its own neighbour, unless there is no other.
-                if vertex == parent.place && !entry.begins() && vertices > 1 {
+            let has_other = parent.vertices > 1 || !fixed && parent.vertices > 0;
+            for vertex in parent.vertices() {
+                // No path stays at a vertex, unless there is no other.
+                if has_other && Some(vertex) == parent.at && !newest.1.starts_sequence() {
                     continue;
                 }
                 let (gain, key) = if fixed {
-                    parent.arrival(prices, record, index, entry, vertex)
+                    parent.localisation_gain(model, history, newest, vertex)
                 } else {
-                    parent.gain(prices, record, index, entry, vertex)
+                    parent.gain(model, history, newest, Some(vertex))
                 };
                 let score = parent.score() + gain;
-                if usize::from(vertex) == V {
-                    missed = missed.max(score);
-                } else {
-                    insert(&mut chosen, &mut count, wanted, Candidate { score, gain, key, parent: slot, vertex });
+                insert_distinct(&mut chosen, wanted, Prediction { score, gain, key, parent: slot, vertex });
+            }
+            if !fixed {
+                let (gain, key) = parent.gain(model, history, newest, None);
+                let score = parent.score() + gain;
+                match parent.next_vertex() {
+                    Some(vertex) => {
+                        insert_distinct(&mut chosen, wanted, Prediction { score, gain, key, parent: slot, vertex });
+                    }
+                    None => without_room = without_room.max(score),
                 }
             }
         }
-        let lacks_room = count > 0 && chosen.first().is_some_and(|best| missed > best.score);
-        let mut children = [0_u8; N];
-        for candidate in chosen.iter().take(count) {
-            if let Some(children) = children.get_mut(usize::from(candidate.parent)) {
-                *children += 1;
-            }
-        }
-        // All but the last child of a parent get a copy of it, in the slot of a hypothesis without children.
-        let mut left = children;
-        let mut free = 0;
-        for candidate in chosen.iter_mut().take(count) {
-            let parent = usize::from(candidate.parent);
-            let Some(left) = left.get_mut(parent) else { continue };
-            *left -= 1;
-            if *left > 0 {
-                while children.get(free).is_some_and(|&children| children > 0) {
-                    free += 1;
-                }
-                copy(&mut self.slots, parent, free);
-                candidate.parent = free as u8;
-                free += 1;
-            }
-        }
-        let mut taken = [false; N];
-        for (candidate, order) in chosen.iter().take(count).zip(&mut self.order) {
-            *order = candidate.parent;
-            if let (Some(hypothesis), Some(taken)) =
-                (self.slots.get_mut(usize::from(candidate.parent)), taken.get_mut(usize::from(candidate.parent)))
-            {
+        let lacks_room = chosen.as_slice().first().is_some_and(|best| without_room > best.score);
+        self.assign_slots(chosen.as_mut_slice());
+        for prediction in chosen.as_slice() {
+            if let Some(hypothesis) = self.slots.get_mut(usize::from(prediction.parent)) {
                 if fixed {
-                    hypothesis.arrive(index, candidate.vertex, candidate.gain);
+                    hypothesis.localise(newest.0, prediction.vertex, prediction.gain);
                 } else {
-                    hypothesis.extend(prices, record, index, entry, candidate.vertex, candidate.gain);
+                    hypothesis.extend(model, history, newest, prediction.vertex, prediction.gain);
                 }
-                *taken = true;
             }
         }
-        let free = (0..).zip(&taken).filter(|(_, taken)| !**taken).map(|(slot, _)| slot);
-        self.order.iter_mut().skip(count).zip(free).for_each(|(order, slot)| *order = slot);
-        self.len = count;
         lacks_room
     }
 
-    /// Takes in a hypothesis: in place of the one with the same map and place if it is better than that, else in a free
-    /// slot, else in place of the worst. Tells whether it was taken.
+    /// Gives each prediction a slot of its own with its parent: all but the last prediction of a parent get a copy, in the slot
+    /// of a hypothesis without predictions.
+    fn assign_slots(&mut self, predictions: &mut [Prediction]) {
+        let mut left = [0_u8; N];
+        for prediction in &*predictions {
+            if let Some(left) = left.get_mut(usize::from(prediction.parent)) {
+                *left += 1;
+            }
+        }
+        let mut is_taken = left.map(|left| left > 0);
+        for prediction in &mut *predictions {
+            let parent = usize::from(prediction.parent);
+            let Some(left) = left.get_mut(parent) else { continue };
+            *left -= 1;
+            if *left > 0
+                && let Some(free) = is_taken.iter().position(|is_taken| !is_taken)
+            {
+                copy(&mut self.slots, parent, free);
+                is_taken.iter_mut().skip(free).take(1).for_each(|is_taken| *is_taken = true);
+                prediction.parent = free as u8;
+            }
+        }
+        let taken = predictions.iter().map(|prediction| prediction.parent);
+        let free = (0..).zip(&is_taken).filter(|(_, is_taken)| !**is_taken).map(|(slot, _)| slot);
+        self.order.iter_mut().zip(taken.chain(free)).for_each(|(order, slot)| *order = slot);
+        self.len = predictions.len();
+    }
+
+    /// Inserts a hypothesis: in place of the one with the same map and vertex of the robot if it is better than that, else in a
+    /// free slot, else in place of the worst. Returns whether it was inserted.
     pub(crate) fn insert(&mut self, hypothesis: &Hypothesis<V, T>, wanted: usize) -> bool {
         let key = hypothesis.key();
         let rank = self.iter().position(|held| held.key() == key);
@@ -224,31 +227,17 @@ impl<const N: usize, const V: usize, const T: usize> Beam<N, V, T> {
     }
 }
 
-/// Puts a candidate among the best distinct ones.
-fn insert<const N: usize>(chosen: &mut [Candidate; N], count: &mut usize, wanted: usize, candidate: Candidate) {
-    if *count == wanted && chosen.get(wanted - 1).is_some_and(|worst| candidate.score <= worst.score) {
+/// Inserts a prediction into the best ones, of which no two have the same key.
+fn insert_distinct<const N: usize>(chosen: &mut TopK<Prediction, N>, wanted: usize, prediction: Prediction) {
+    let goes_first = |one: &Prediction, other: &Prediction| one.score >= other.score;
+    let is_full = chosen.as_slice().len() >= wanted.min(N);
+    if is_full && chosen.as_slice().last().is_some_and(|worst| goes_first(worst, &prediction)) {
         return;
     }
-    let mut slot = match chosen.iter().take(*count).position(|held| held.key == candidate.key) {
-        Some(same) if chosen.get(same).is_some_and(|held| held.score >= candidate.score) => return,
-        Some(same) => same,
-        None if *count < wanted => {
-            *count += 1;
-            *count - 1
-        }
-        None => wanted - 1,
-    };
-    while let Some(&before) = slot.checked_sub(1).and_then(|before| chosen.get(before)) {
-        if before.score >= candidate.score {
-            break;
-        }
-        if let Some(to) = chosen.get_mut(slot) {
-            *to = before;
-        }
-        slot -= 1;
-    }
-    if let Some(to) = chosen.get_mut(slot) {
-        *to = candidate;
+    match chosen.as_slice().iter().position(|held| held.key == prediction.key) {
+        Some(same) if chosen.as_slice().get(same).is_some_and(|held| goes_first(held, &prediction)) => {}
+        Some(same) => chosen.replace(same, prediction, goes_first),
+        None => chosen.insert_within(wanted, prediction, goes_first),
     }
 }
 
@@ -279,29 +268,29 @@ mod tests {
     }
 
     #[test]
-    fn hypotheses_are_distinct_ranked_and_as_good_as_counted_anew() {
-        let mut prices = Prices::new();
-        prices.configure(&RobustConfig::DEFAULT);
-        let mut record = Record::<32>::new();
+    fn hypotheses_are_distinct_ranked_and_have_the_evidence_that_a_recount_gives() {
+        let mut model = Model::new();
+        model.configure(&RobustConfig::DEFAULT);
+        let mut history = ObservationHistory::<32>::new();
         let mut beam = Box::new(Beam::<6, 5, 32>::new());
         beam.clear();
         for index in 0..32 {
             let steps = 500 + 60 * (index as u16 * 7 % 4) + index as u16 % 5;
             let observation = Observation::new(Fingerprint::from_steps(steps).unwrap());
-            record.push(&Observation { starts_sequence: index % 12 == 0, degree: Some(2), ..observation });
-            let entry = record.get(index).unwrap();
-            beam.grow(&prices, &record, (index, entry), WANTED, false);
+            history.push(&Observation { starts_sequence: index % 12 == 0, degree: Some(2), ..observation });
+            let observation = history.get(index).unwrap();
+            beam.grow(&model, &history, (index, observation), WANTED, false);
             check(&beam);
             for rank in 0..beam.len() {
                 // As a move does: another vertex for one place, which may give a map that is there already.
                 let mut other = *beam.get(rank).unwrap();
                 let (evidence, key) = (other.evidence, other.key());
-                other.rebuild(&prices, &record);
+                other.rebuild(&model, &history);
                 assert!((other.evidence - evidence).abs() < 1e-2, "{} {evidence}", other.evidence);
                 assert_eq!(other.key(), key);
                 other.path[index / 2] = other.path[index / 3];
-                other.rebuild(&prices, &record);
-                if (0..5).all(|vertex| !other.is_edge(vertex, vertex)) {
+                other.rebuild(&model, &history);
+                if other.vertices().all(|vertex| !other.is_edge(vertex, vertex)) {
                     beam.insert(&other, WANTED);
                 }
                 check(&beam);
@@ -311,7 +300,7 @@ mod tests {
     }
 
     #[test]
-    fn an_equal_map_is_taken_in_only_when_it_is_better_and_in_place_of_the_other() {
+    fn a_hypothesis_with_the_same_map_is_replaced_only_by_a_better_one() {
         let mut beam = Box::new(Beam::<6, 5, 32>::new());
         beam.clear();
         let mut same = *beam.get(0).unwrap();
@@ -321,7 +310,7 @@ mod tests {
         assert_eq!((beam.len(), beam.get(0).map(Hypothesis::score)), (1, Some(1.0)));
         same.evidence = 0.5;
         assert!(!beam.insert(&same, WANTED));
-        same.place = 1;
+        same.at = VertexId::new(1);
         assert!(beam.insert(&same, WANTED));
         assert_eq!(beam.len(), 2);
     }

@@ -14,7 +14,7 @@ pub struct RobustConfig {
     pub noise_mm: u16,
     /// The step of the fingerprints in millimetres, 1 to 1000: noise well below it is not believed. Default 2.
     pub resolution_mm: u16,
-    /// How many repair moves are tried at each place, 0 to 255. Default 1; more are made by `RobustFilter::polish`, in
+    /// How many repair moves are tried at each place, 0 to 255. Default 1; more are made by `RobustFilter::refine`, in
     /// the time between two places.
     pub moves: u8,
     /// How often a turn hint is wrong, in thousandths, 1 to 500. Default 20.

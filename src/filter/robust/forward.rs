@@ -1,160 +1,206 @@
-//! The evidence of a map over all paths, not the best one alone: the forward pass over pairs of successive places.
-//!
-//! With labels weighed by the expectation of their log density under the posterior of each vertex, the collapsed evidence
-//! of a path plus −ln of the probability of that path among all paths of the map is a lower bound of the evidence of the
-//! map (the variational bound with the labels' posterior held at what the path says). It needs no second pass.
+//! The forward pass over all paths of a map: the distribution of the newest vertex, and the bound of the map's other paths.
 
-use super::hypothesis::{Hypothesis, NOWHERE};
-use super::lattice::{Column, Model, WIDTH, Weighing};
-use super::prices::{Prices, SURPLUS_SHARE};
-use super::record::Record;
+use super::history::ObservationHistory;
+use super::hmm::{Emissions, Hmm};
+use super::hypothesis::Hypothesis;
+use super::lattice::{Cells, Column, Lattice, PerSlot, Semiring, Slot, Stage, State, WIDTH};
+use super::model::{Model, OTHER_PATHS_SHARE};
+use super::proposals::ALL;
+use crate::Turn;
+use crate::map::{PerVertex, VertexId};
 
-/// Products of likelihoods are turned into logarithms when they leave this range.
+/// The product of the normalisers is turned into a logarithm below this.
 const SMALL: f32 = 1e-12;
 
-/// The working memory of the forward pass.
+/// What the forward pass found out.
 #[derive(Clone, Debug)]
 pub(super) struct Forward<const V: usize> {
-    cells: [[[f32; WIDTH]; WIDTH]; 2],
-    /// The probability of each vertex at the newest place.
-    pub(super) belief: [f32; V],
+    /// The probability of each vertex at the newest observation.
+    pub(super) belief: PerVertex<f32, V>,
 }
 
 impl<const V: usize> Forward<V> {
     pub(super) const fn new() -> Self {
-        Self { cells: [[[0.0; WIDTH]; WIDTH]; 2], belief: [0.0; V] }
+        Self { belief: PerVertex::filled(0.0) }
     }
 
-    /// Computes how much the map of a hypothesis gains from its other paths, and the distribution of its newest place.
-    pub(super) fn soften<const T: usize>(
+    /// Updates the bound of the map's other paths, and the belief.
+    ///
+    /// Let the labels' posterior be what the path of the hypothesis says, and weigh each label by the expectation of its log
+    /// density under it ([`Emissions::Expected`]). Then the evidence of the path plus
+    ///
+    /// ```text
+    /// −ln P(path | map, observations) = ln Σ_paths P(path, observations) − ln P(path, observations)
+    /// ```
+    ///
+    /// is a lower bound of the evidence of the map: the variational bound. [`OTHER_PATHS_SHARE`] of it counts. It takes no
+    /// backward pass. Cost: O(T · (V + WIDTH²)).
+    pub(super) fn update_bound<const T: usize>(
         &mut self,
-        prices: &Prices,
-        record: &Record<T>,
-        model: &mut Model<V>,
+        lattice: &mut Lattice,
+        model: &Model,
+        history: &ObservationHistory<T>,
+        hmm: &mut Hmm<V>,
         hypothesis: &mut Hypothesis<V, T>,
     ) {
-        model.read(prices, record, hypothesis, Weighing::Expected);
-        hypothesis.surplus = SURPLUS_SHARE * self.surplus(prices, record, model, hypothesis);
+        hmm.read(model, history, hypothesis, Emissions::Expected);
+        hypothesis.other_paths = OTHER_PATHS_SHARE * self.other_paths(lattice, model, history, hmm, hypothesis);
     }
 
-    /// −ln of the probability of the path of a hypothesis among all paths of its map, 0 or more. Leaves the distribution
-    /// of the newest place in `belief`. Cost: O(T · (V + WIDTH²)).
-    fn surplus<const T: usize>(
+    /// −ln P(path | map, observations), 0 or more.
+    fn other_paths<const T: usize>(
         &mut self,
-        prices: &Prices,
-        record: &Record<T>,
-        model: &Model<V>,
+        lattice: &mut Lattice,
+        model: &Model,
+        history: &ObservationHistory<T>,
+        hmm: &Hmm<V>,
         hypothesis: &Hypothesis<V, T>,
     ) -> f32 {
-        let mut columns = [Column::EMPTY; 3];
-        let [cells, next] = &mut self.cells;
-        let start = 1.0 / f32::from(hypothesis.vertices.max(1));
-        let mut second_of_sequence = false;
-        let mut ln_all = 0.0_f32;
-        let mut ln_path = 0.0_f32;
-        let mut scale = 1.0_f32;
-        let mut on_path = NOWHERE;
-        let mut before_path = NOWHERE;
-        let mut rows = 0;
-        for (index, (entry, &on_path_now)) in record.iter().zip(&hypothesis.path).enumerate() {
-            let [earlier, here, there] = &mut columns;
-            model.column(prices, entry, u32::MAX, there);
-            if there.position(on_path_now) == WIDTH {
-                there.include(on_path_now, model.fit(prices, on_path_now, entry));
-            }
-            let best_fit = there.fits.first().copied().unwrap_or(0.0);
-            let mut weights = [0.0_f32; WIDTH];
-            for (weight, (vertex, fit)) in weights.iter_mut().zip(there.iter()) {
-                *weight = if fit == best_fit { 1.0 } else { libm::expf(fit - best_fit) };
-                if vertex == on_path_now {
-                    ln_path += fit - best_fit;
-                }
-            }
-            let begins = entry.begins() || index == 0;
-            let mut total = 0.0;
-            *next = [[0.0; WIDTH]; WIDTH];
-            if begins {
-                let from = if entry.begins() { NOWHERE } else { hypothesis.before };
-                for (slot, (&vertex, weight)) in there.vertices().iter().zip(weights).enumerate() {
-                    let way = match from {
-                        NOWHERE => start,
-                        from if model.is_edge(from, vertex) => model.exit(from),
-                        _ => 0.0,
-                    };
-                    if vertex == on_path_now {
-                        ln_path += libm::logf(way);
-                    }
-                    // All paths of the sequence before lead here.
-                    let probability = way * weight;
-                    total += probability;
-                    if let Some(cell) = next.first_mut().and_then(|row| row.get_mut(slot)) {
-                        *cell = probability;
-                    }
-                }
-            } else {
-                let hint = if second_of_sequence { None } else { entry.turn() };
-                let (ln_on, ln_back) = (prices.turn(hint, false), prices.turn(hint, true));
-                let (on, back) = if hint.is_some() { (libm::expf(ln_on), libm::expf(ln_back)) } else { (1.0, 1.0) };
-                ln_path += model.ln_exit(on_path) + if before_path == on_path_now { ln_back } else { ln_on };
-                let mut earlier_slots = [WIDTH; WIDTH];
-                if hint.is_some() {
-                    for (slot, &vertex) in earlier_slots.iter_mut().zip(there.vertices()) {
-                        *slot = earlier.position(vertex);
-                    }
-                }
-                // Without a turn hint behind, the ways to a vertex need not be told apart.
-                let together = record.forgets_way(index);
-                for (slot, &from) in here.vertices().iter().enumerate() {
-                    let sum: f32 = cells.iter().take(rows).filter_map(|row| row.get(slot)).sum();
-                    if sum <= 0.0 {
-                        continue;
-                    }
-                    let exit = model.exit(from);
-                    for (to_slot, ((&to, weight), &earlier_slot)) in
-                        there.vertices().iter().zip(weights).zip(&earlier_slots).enumerate()
-                    {
-                        if !model.is_edge(from, to) {
-                            continue;
-                        }
-                        let returning = cells.get(earlier_slot).and_then(|row| row.get(slot)).copied().unwrap_or(0.0);
-                        let probability = exit * weight * (on * (sum - returning) + back * returning);
-                        total += probability;
-                        if let Some(cell) =
-                            next.get_mut(if together { 0 } else { slot }).and_then(|row| row.get_mut(to_slot))
-                        {
-                            *cell += probability;
-                        }
-                    }
-                }
-            }
-            if total <= 0.0 || !total.is_finite() {
-                return 0.0;
-            }
-            let normaliser = 1.0 / total;
-            rows = if begins || record.forgets_way(index) { 1 } else { here.len };
-            for row in next.iter_mut().take(rows) {
-                row.iter_mut().for_each(|cell| *cell *= normaliser);
-            }
-            scale *= total;
-            if scale < SMALL {
-                ln_all += libm::logf(scale);
-                scale = 1.0;
-            }
-            (before_path, on_path) = (if begins { NOWHERE } else { on_path }, on_path_now);
-            second_of_sequence = begins;
-            core::mem::swap(cells, next);
-            columns.rotate_left(1);
+        let mut sum = AllPaths {
+            model,
+            hmm,
+            path: &hypothesis.path,
+            start: 1.0 / f32::from(hypothesis.vertices.max(1)),
+            weights: PerSlot([0.0; WIDTH]),
+            total: 0.0,
+            scale: 1.0,
+            ln_all: 0.0,
+            ln_path: 0.0,
+            now: VertexId::FIRST,
+            before: None,
+            earlier: None,
+        };
+        let Some((column, cells)) = lattice.walk(&mut sum, (model, history, hmm), ALL, hypothesis.before) else {
+            return 0.0;
+        };
+        self.belief.fill(0.0);
+        for (slot, state) in column.iter() {
+            self.belief[state.vertex] = cells.0.iter().map(|row| row[slot]).sum();
         }
-        ln_all += libm::logf(scale);
-        self.belief = [0.0; V];
-        if let Some(column) = columns.get(1) {
-            for (slot, &vertex) in column.vertices().iter().enumerate() {
-                let probability = self.cells[0].iter().filter_map(|row| row.get(slot)).sum();
-                if let Some(belief) = self.belief.get_mut(usize::from(vertex)) {
-                    *belief = probability;
-                }
+        (sum.ln_all + libm::logf(sum.scale) - sum.ln_path).max(0.0)
+    }
+}
+
+/// The semiring of probabilities, which also follows one path. The cells are normalised at each observation.
+struct AllPaths<'a, const V: usize> {
+    model: &'a Model,
+    hmm: &'a Hmm<V>,
+    /// The path that is followed.
+    path: &'a [VertexId],
+    /// The probability of each vertex at the start of a sequence.
+    start: f32,
+    /// The likelihood of each state of the column, relative to the best one.
+    weights: PerSlot<f32>,
+    /// The sum of the cells.
+    total: f32,
+    /// The product of the sums, as far as it is not in `ln_all` yet.
+    scale: f32,
+    /// ln of the sum over all paths.
+    ln_all: f32,
+    /// ln of the path.
+    ln_path: f32,
+    /// The vertices of the path at this observation, the one before, and the one before that in the same sequence.
+    now: VertexId,
+    before: Option<VertexId>,
+    earlier: Option<VertexId>,
+}
+
+impl<const V: usize> Semiring for AllPaths<'_, V> {
+    const ZERO: f32 = 0.0;
+
+    /// The sum of all paths into a slot, and the probability of each exit.
+    type Incoming = (f32, f32);
+
+    fn enter(&mut self, stage: &Stage, column: &mut Column) {
+        self.earlier = if stage.is_second { None } else { self.before };
+        self.before = if stage.index == 0 { None } else { Some(self.now) };
+        self.now = self.path.get(stage.index).copied().unwrap_or(VertexId::FIRST);
+        if column.slot_of(self.now).is_none() {
+            let ln_emission = self.hmm.ln_emission(self.model, self.now, stage.observation);
+            column.insert_always(self.now, ln_emission);
+        }
+        let best = column.best();
+        self.total = 0.0;
+        for (slot, state) in column.iter() {
+            let behind = state.ln_emission - best;
+            self.weights[slot] = if state.ln_emission == best { 1.0 } else { libm::expf(behind) };
+            if state.vertex == self.now {
+                self.ln_path += behind;
             }
         }
-        (ln_all - ln_path).max(0.0)
+    }
+
+    fn close(&mut self, _: &Stage, _: &Cells, _: &Column) -> f32 {
+        // The cells are normalised: all paths of the sequence before lead here.
+        1.0
+    }
+
+    fn start(&mut self, _: f32, from: Option<VertexId>, slot: Slot, state: &State) -> f32 {
+        let transition = match from {
+            None => self.start,
+            Some(from) if self.hmm.is_edge(from, state.vertex) => self.hmm.exit(from),
+            Some(_) => 0.0,
+        };
+        if state.vertex == self.now {
+            self.ln_path += libm::logf(transition);
+        }
+        let probability = transition * self.weights[slot];
+        self.total += probability;
+        probability
+    }
+
+    fn turns(&mut self, hint: Option<Turn>) -> [f32; 2] {
+        let [ln_on, ln_back] = [self.model.ln_turn(hint, false), self.model.ln_turn(hint, true)];
+        let ln_exit = self.before.map_or(0.0, |before| self.hmm.ln_exit(before));
+        self.ln_path += ln_exit + if self.earlier == Some(self.now) { ln_back } else { ln_on };
+        if hint.is_some() { [libm::expf(ln_on), libm::expf(ln_back)] } else { [1.0; 2] }
+    }
+
+    fn incoming(
+        &mut self,
+        cells: &Cells,
+        rows: usize,
+        _: bool,
+        (slot, from): (Slot, &State),
+    ) -> Option<Self::Incoming> {
+        let sum: f32 = Slot::first(rows).map(|row| cells[row][slot]).sum();
+        if sum <= 0.0 { None } else { Some((sum, self.hmm.exit(from.vertex))) }
+    }
+
+    fn transition(
+        &mut self,
+        (sum, exit): Self::Incoming,
+        (_, returning): (Option<Slot>, f32),
+        [on, turn]: [f32; 2],
+        from: &State,
+        (slot, to): (Slot, &State),
+    ) -> Option<f32> {
+        if !self.hmm.is_edge(from.vertex, to.vertex) {
+            return None;
+        }
+        Some(exit * self.weights[slot] * (on * (sum - returning) + turn * returning))
+    }
+
+    fn add(&mut self, cell: &mut f32, value: f32, _: Slot, _: Slot) {
+        self.total += value;
+        *cell += value;
+    }
+
+    fn leave(&mut self, _: &Stage, _: Slot, _: Self::Incoming) {}
+
+    fn finish(&mut self, _: &Stage, cells: &mut Cells, rows: usize) -> Option<()> {
+        if self.total <= 0.0 || !self.total.is_finite() {
+            return None;
+        }
+        let normaliser = 1.0 / self.total;
+        for row in Slot::first(rows) {
+            cells[row].0.iter_mut().for_each(|cell| *cell *= normaliser);
+        }
+        self.scale *= self.total;
+        if self.scale < SMALL {
+            self.ln_all += libm::logf(self.scale);
+            self.scale = 1.0;
+        }
+        Some(())
     }
 }

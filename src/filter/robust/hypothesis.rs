@@ -1,291 +1,250 @@
-//! One hypothesis: which vertex each observation belongs to, and the map and counts that follow from that.
+//! One hypothesis: the vertex of each observation, and the map and statistics that follow from it.
 
-use super::prices::{EDGE, Prices, VERTEX};
-use super::record::Record;
-use super::tally::Tally;
-use crate::Map;
-use crate::map::bits;
+use super::history::ObservationHistory;
+use super::model::{LN_EDGE, LN_VERTEX, Model};
+use super::statistics::VertexStatistics;
+use crate::map::{PerVertex, VertexId, VertexSet32};
 
-/// No vertex: before the first place, or where the robot's way is not known.
-pub(crate) const NOWHERE: u8 = u8::MAX;
+/// The cost of a path that stays at one vertex for two observations, in nats: such a hypothesis is never kept.
+const SELF_LOOP_COST: f32 = 1e6;
 
-/// The price of a path that stays at one vertex for two places: such a path is never kept.
-const STANDSTILL: f32 = 1e6;
-
-/// A partition of the newest `T` observations, and of all that came before them, into at most `V` vertices.
+/// A partition of the newest `T` observations, and of all that were marginalised, into at most `V` vertices.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Hypothesis<const V: usize, const T: usize> {
+    /// How many vertices the map has.
     pub(crate) vertices: u8,
     /// The vertex of the newest observation.
-    pub(crate) place: u8,
-    /// The vertex of the place before the oldest observation of the record; [`NOWHERE`] when there is none.
-    pub(crate) before: u8,
-    /// How many sequences begin in the record.
+    pub(crate) at: Option<VertexId>,
+    /// The vertex of the observation before the history, from which the robot drove to the oldest one.
+    pub(crate) before: Option<VertexId>,
+    /// How many sequences start in the history.
     pub(crate) starts: u16,
     /// ln P of all turn hints.
-    pub(crate) hints: f32,
-    /// The collapsed evidence of map and path.
+    pub(crate) ln_hints: f32,
+    /// The evidence of map and path.
     pub(crate) evidence: f32,
-    /// By how much the evidence of the map, all its paths together, exceeds that of this one path, as last computed.
-    pub(crate) surplus: f32,
-    /// Evidence of counts that have faded.
-    pub(crate) faded: f32,
-    /// Identifies the map; vertices are numbered in the order of their first visit.
+    /// The bound of the map's other paths when it was last updated: a share of −ln P(path | map, observations), which is how
+    /// much the evidence of all paths of the map exceeds that of this path, at least.
+    pub(crate) other_paths: f32,
+    /// The evidence that decayed with marginalised statistics.
+    pub(crate) decayed: f32,
+    /// A hash of the edges. Vertices are numbered in the order of their first visit.
     pub(crate) map_key: u32,
-    pub(crate) path: [u8; T],
-    pub(crate) tallies: [Tally; V],
-    /// What left the record.
-    pub(crate) settled: [Tally; V],
-    pub(crate) neighbours: [u32; V],
-    /// Edges that were driven before the record begins.
-    pub(crate) settled_neighbours: [u32; V],
+    /// The vertex of each observation of the history.
+    pub(crate) path: [VertexId; T],
+    /// The statistics of all observations.
+    pub(crate) statistics: PerVertex<VertexStatistics, V>,
+    /// The statistics of the observations that left the history.
+    pub(crate) marginalised: PerVertex<VertexStatistics, V>,
+    /// The edges.
+    pub(crate) neighbours: PerVertex<VertexSet32, V>,
+    /// The edges that were driven before the history.
+    pub(crate) marginalised_neighbours: PerVertex<VertexSet32, V>,
 }
 
 impl<const V: usize, const T: usize> Hypothesis<V, T> {
-    pub(crate) const NONE: Self = Self {
+    pub(crate) const EMPTY: Self = Self {
         vertices: 0,
-        place: 0,
-        before: 0,
+        at: None,
+        before: None,
         starts: 0,
-        hints: 0.0,
+        ln_hints: 0.0,
         evidence: 0.0,
-        surplus: 0.0,
-        faded: 0.0,
+        other_paths: 0.0,
+        decayed: 0.0,
         map_key: 0,
-        path: [0; T],
-        tallies: [Tally::NONE; V],
-        settled: [Tally::NONE; V],
-        neighbours: [0; V],
-        settled_neighbours: [0; V],
+        path: [VertexId::FIRST; T],
+        statistics: PerVertex::filled(VertexStatistics::NONE),
+        marginalised: PerVertex::filled(VertexStatistics::NONE),
+        neighbours: PerVertex::filled(VertexSet32::EMPTY),
+        marginalised_neighbours: PerVertex::filled(VertexSet32::EMPTY),
     };
 
+    /// Removes all vertices.
     pub(crate) fn clear(&mut self) {
         self.vertices = 0;
-        self.place = NOWHERE;
-        self.before = NOWHERE;
+        self.at = None;
+        self.before = None;
         self.starts = 0;
-        self.hints = 0.0;
+        self.ln_hints = 0.0;
         self.evidence = 0.0;
-        self.surplus = 0.0;
-        self.faded = 0.0;
+        self.other_paths = 0.0;
+        self.decayed = 0.0;
         self.map_key = 0;
-        self.tallies.fill(Tally::NONE);
-        self.settled.fill(Tally::NONE);
-        self.neighbours.fill(0);
-        self.settled_neighbours.fill(0);
+        self.statistics.fill(VertexStatistics::NONE);
+        self.marginalised.fill(VertexStatistics::NONE);
+        self.neighbours.fill(VertexSet32::EMPTY);
+        self.marginalised_neighbours.fill(VertexSet32::EMPTY);
     }
 
-    /// What hypotheses are ranked by.
+    /// The rank of the hypothesis: the evidence of the map, with the share of its other paths.
     pub(crate) fn score(&self) -> f32 {
-        self.evidence + self.surplus
+        self.evidence + self.other_paths
     }
 
+    /// Identifies the map and the robot's vertex.
     pub(crate) fn key(&self) -> u32 {
-        keyed(self.map_key, self.vertices, self.place)
+        keyed(self.map_key, self.vertices, self.at)
     }
 
-    pub(crate) fn tally(&self, vertex: u8) -> Tally {
-        self.tallies.get(usize::from(vertex)).copied().unwrap_or(Tally::NONE)
-    }
-
-    pub(crate) fn row(&self, vertex: u8) -> u32 {
-        self.neighbours.get(usize::from(vertex)).copied().unwrap_or(0)
-    }
-
-    pub(crate) fn degree(&self, vertex: u8) -> u32 {
-        self.row(vertex).count_ones()
-    }
-
-    pub(crate) fn at(&self, index: usize) -> u8 {
-        self.path.get(index).copied().unwrap_or(NOWHERE)
-    }
-
-    pub(crate) fn edges(&self) -> u32 {
-        let rows = self.neighbours.iter().take(usize::from(self.vertices));
-        rows.map(|row| row.count_ones()).sum::<u32>() / 2
-    }
-
-    pub(crate) fn is_edge(&self, a: u8, b: u8) -> bool {
-        self.row(a) >> (b & 31) & 1 == 1
-    }
-
-    /// Identifies the map, wherever the robot is.
+    /// Identifies the map alone.
     pub(crate) fn map_alone_key(&self) -> u32 {
-        keyed(self.map_key, self.vertices, 0)
+        keyed(self.map_key, self.vertices, Some(VertexId::FIRST))
     }
 
-    /// A hypothesis that knows a map and has seen nothing yet.
-    pub(crate) fn know(&mut self, map: &Map<V>, deviation_steps: f32) {
-        self.clear();
-        self.vertices = map.vertices().len() as u8;
-        for vertex in map.vertices() {
-            let slot = vertex.index();
-            if let (Some(settled), Some(row), Some(label)) =
-                (self.settled.get_mut(slot), self.settled_neighbours.get_mut(slot), map.label(vertex))
-            {
-                *settled = Tally::known(label, map.visits(vertex).min(u32::from(u16::MAX)) as u16, deviation_steps);
-                // A loop says that the place is its own neighbour, which no path of this filter uses.
-                *row = map.neighbours(vertex).bits() as u32 & !(1 << (u8::from(vertex) & 31));
-            }
+    /// The vertices of the map.
+    pub(crate) fn vertices(&self) -> impl ExactSizeIterator<Item = VertexId> + DoubleEndedIterator + Clone + use<V, T> {
+        VertexId::first(self.vertices.into())
+    }
+
+    /// The vertex that the map would get next; `None` when it is full.
+    pub(crate) fn next_vertex(&self) -> Option<VertexId> {
+        VertexId::new(self.vertices).filter(|vertex| vertex.index() < V)
+    }
+
+    /// The vertex of an observation of the history.
+    pub(crate) fn vertex_of(&self, index: usize) -> Option<VertexId> {
+        self.path.get(index).copied()
+    }
+
+    /// Sets the vertex of an observation of the history.
+    pub(crate) fn set_vertex_of(&mut self, index: usize, vertex: VertexId) {
+        if let Some(slot) = self.path.get_mut(index) {
+            *slot = vertex;
         }
     }
 
-    /// Takes leave of the oldest observation: its counts stay. Tells whether counts have faded, so that the hypothesis has to
-    /// be [rebased](Hypothesis::rebase) when the record has dropped the observation.
-    pub(crate) fn settle_oldest(&mut self, record: &Record<T>) -> bool {
-        let (Some(oldest), Some(next)) = (record.get(0), record.get(1)) else { return false };
-        let mut has_faded = false;
-        let vertex = self.at(0);
-        if !oldest.begins() && self.before != NOWHERE {
-            join(&mut self.settled_neighbours, self.before, vertex);
-        }
-        if let Some(settled) = self.settled.get_mut(usize::from(vertex)) {
-            settled.include(oldest);
-            if !next.begins() {
-                settled.exits = settled.exits.saturating_add(1);
-            }
-            has_faded = settled.fade();
-        }
-        self.before = if next.begins() { NOWHERE } else { vertex };
-        self.path.copy_within(1.., 0);
-        has_faded
+    /// How many neighbours a vertex has.
+    pub(crate) fn degree(&self, vertex: VertexId) -> u32 {
+        self.neighbours[vertex].bits().count_ones()
     }
 
-    /// Counts anew what the settled counts say now, with the evidence as it was.
-    pub(crate) fn rebase(&mut self, prices: &Prices, record: &Record<T>) {
-        let before = self.evidence;
-        self.recount(prices, record);
-        self.faded += before - self.evidence;
-        self.evidence = before;
+    /// Whether an edge joins two vertices.
+    pub(crate) fn is_edge(&self, a: VertexId, b: VertexId) -> bool {
+        self.neighbours[a].contains(b)
     }
 
-    /// Takes a common amount of faded evidence from a hypothesis, so that sums stay small in long runs.
-    pub(crate) fn forget(&mut self, faded: f32) {
-        self.faded -= faded;
-        self.evidence -= faded;
+    /// How many edges the map has.
+    fn edges(&self) -> u32 {
+        self.vertices().map(|vertex| self.degree(vertex)).sum::<u32>() / 2
     }
 
-    pub(crate) fn faded(&self) -> f32 {
-        self.faded
+    /// Follows from a path that was changed: numbers the vertices by first visit, drops those without visits, and computes
+    /// statistics, edges and evidence. Cost: O(T + V).
+    pub(crate) fn rebuild(&mut self, model: &Model, history: &ObservationHistory<T>) {
+        self.renumber(history.len());
+        self.recount(model, history);
     }
 
-    /// Counts everything anew from a path that was changed: numbers the vertices by first visit, drops those without
-    /// visits, and computes the evidence. Cost: O(T + V).
-    pub(crate) fn rebuild(&mut self, prices: &Prices, record: &Record<T>) {
-        self.renumber(record.len());
-        self.recount(prices, record);
-    }
-
-    /// As [`Hypothesis::rebuild`], with the numbers as they are.
-    pub(crate) fn recount(&mut self, prices: &Prices, record: &Record<T>) {
-        self.tallies = self.settled;
-        self.neighbours = self.settled_neighbours;
+    /// As [`Hypothesis::rebuild`], with the vertices as they are numbered.
+    pub(crate) fn recount(&mut self, model: &Model, history: &ObservationHistory<T>) {
+        self.statistics = self.marginalised;
+        self.neighbours = self.marginalised_neighbours;
         self.starts = 0;
-        self.hints = 0.0;
+        self.ln_hints = 0.0;
         let mut from = self.before;
-        for (index, entry) in record.iter().enumerate() {
-            let vertex = self.at(index);
-            if let Some(tally) = self.tallies.get_mut(usize::from(vertex)) {
-                tally.include(entry);
-            }
-            if entry.begins() || from == NOWHERE {
-                self.starts = self.starts.saturating_add(1);
-            } else {
-                // The exit of the place before the record was counted when it left.
-                if index > 0
-                    && let Some(left) = self.tallies.get_mut(usize::from(from))
-                {
-                    left.exits = left.exits.saturating_add(1);
+        for (index, (observation, &vertex)) in history.iter().zip(&self.path).enumerate() {
+            self.statistics[vertex].include(observation);
+            match from {
+                Some(from) if !observation.starts_sequence() => {
+                    // The exit to the oldest observation was counted when the one before it was marginalised.
+                    if index > 0 {
+                        let exits = &mut self.statistics[from].exits;
+                        *exits = exits.saturating_add(1);
+                    }
+                    join(&mut self.neighbours, from, vertex);
+                    self.ln_hints += self.ln_hint(model, history, index, observation, vertex);
                 }
-                join(&mut self.neighbours, from, vertex);
-                self.hints += self.hint(prices, record, index, entry, vertex);
+                _ => self.starts = self.starts.saturating_add(1),
             }
-            from = vertex;
+            from = Some(vertex);
         }
-        self.place = from;
+        self.at = from;
         self.map_key = self.key_of_edges();
-        self.evidence = self.total(prices);
+        self.evidence = self.total(model);
     }
 
-    /// The key of a map with these edges.
+    /// The hash of the edges.
     pub(crate) fn key_of_edges(&self) -> u32 {
         let mut key = 0;
-        for vertex in 0..self.vertices {
-            for neighbour in bits(u64::from(self.row(vertex))).filter(|&neighbour| neighbour > vertex) {
+        for vertex in self.vertices() {
+            for neighbour in self.neighbours[vertex].iter().filter(|&neighbour| neighbour > vertex) {
                 key ^= edge_key(vertex, neighbour);
             }
         }
         key
     }
 
-    /// The evidence from the counts.
-    pub(crate) fn total(&self, prices: &Prices) -> f32 {
-        self.faded + self.factors(prices).iter().sum::<f32>()
+    /// The evidence that the statistics give.
+    pub(crate) fn total(&self, model: &Model) -> f32 {
+        self.decayed + self.factors(model).iter().sum::<f32>()
     }
 
-    /// The factors of the evidence, but for what has faded: of the labels, of the moves between places, and of the size of
-    /// the map.
-    pub(crate) fn factors(&self, prices: &Prices) -> [f32; 3] {
+    /// The factors of the evidence, without what decayed, for K vertices:
+    ///
+    /// - of the labels, [`Model::label_evidence`] of each vertex;
+    /// - of the transitions, [`Model::exit_evidence`] of each vertex, the turn hints ([`Model::ln_turn`]), and −ln K for each
+    ///   start of a sequence;
+    /// - of the size of the map, [`LN_VERTEX`] for each vertex and [`LN_EDGE`] for each edge.
+    pub(crate) fn factors(&self, model: &Model) -> [f32; 3] {
         let mut labels = 0.0;
-        let mut moves = self.hints - f32::from(self.starts) * ln(self.vertices.max(1));
-        for (vertex, tally) in (0..self.vertices).zip(&self.tallies) {
-            labels += prices.label_evidence(tally);
-            moves += prices.exit_evidence(tally, self.degree(vertex));
+        let mut transitions = self.ln_hints - f32::from(self.starts) * ln(self.vertices.max(1));
+        for vertex in self.vertices() {
+            let statistics = &self.statistics[vertex];
+            labels += model.label_evidence(statistics);
+            transitions += model.exit_evidence(statistics, self.degree(vertex));
             if self.is_edge(vertex, vertex) {
-                moves -= STANDSTILL;
+                transitions -= SELF_LOOP_COST;
             }
         }
-        [labels, moves, -(f32::from(self.vertices) * VERTEX + self.edges() as f32 * EDGE)]
+        [labels, transitions, f32::from(self.vertices) * LN_VERTEX + self.edges() as f32 * LN_EDGE]
     }
 
+    /// Numbers the vertices in the order of their first visit, and drops those without visits.
     fn renumber(&mut self, len: usize) {
-        let mut name = [NOWHERE; 32];
-        let mut named = 0;
-        let visits = self.path.iter().take(len).chain(core::iter::once(&self.before)).copied();
-        let unvisited = (0..self.vertices)
-            .filter(|&vertex| self.settled.get(usize::from(vertex)).is_some_and(|tally| tally.visits > 0));
-        for vertex in visits.chain(unvisited) {
-            if let Some(name) = name.get_mut(usize::from(vertex)).filter(|name| **name == NOWHERE) {
-                *name = named;
-                named += 1;
+        let mut numbers = PerVertex::<Option<VertexId>, V>::filled(None);
+        let mut count = 0;
+        let visited = self.path.iter().take(len).copied().chain(self.before);
+        let marginalised = self.vertices().filter(|&vertex| self.marginalised[vertex].visits > 0);
+        for vertex in visited.chain(marginalised) {
+            let number = &mut numbers[vertex];
+            if number.is_none() {
+                *number = VertexId::new(count);
+                count += 1;
             }
         }
-        let name = |vertex: u8| name.get(usize::from(vertex)).copied().unwrap_or(NOWHERE);
-        self.path.iter_mut().take(len).for_each(|vertex| *vertex = name(*vertex));
-        self.before = name(self.before);
-        if self.settled_neighbours.iter().any(|&row| row != 0) || self.before != NOWHERE {
-            let (settled, rows) = (self.settled, self.settled_neighbours);
-            self.settled.fill(Tally::NONE);
-            self.settled_neighbours.fill(0);
-            for (vertex, (tally, row)) in (0..).zip(settled.into_iter().zip(rows)) {
-                let slot = usize::from(name(vertex));
-                if let (Some(to), Some(to_row)) = (self.settled.get_mut(slot), self.settled_neighbours.get_mut(slot)) {
-                    *to = tally;
-                    *to_row = bits(u64::from(row)).fold(0, |renamed, old| renamed | 1 << (name(old) & 31));
+        let number = |vertex| numbers[vertex].unwrap_or(VertexId::FIRST);
+        self.path.iter_mut().take(len).for_each(|vertex| *vertex = number(*vertex));
+        self.before = self.before.map(number);
+        if self.marginalised_neighbours.values().iter().any(|neighbours| !neighbours.is_empty())
+            || self.before.is_some()
+        {
+            let (statistics, neighbours) = (self.marginalised, self.marginalised_neighbours);
+            self.marginalised.fill(VertexStatistics::NONE);
+            self.marginalised_neighbours.fill(VertexSet32::EMPTY);
+            for ((old, statistics), neighbours) in statistics.iter().zip(neighbours.values()) {
+                if let Some(new) = numbers[old] {
+                    self.marginalised[new] = *statistics;
+                    self.marginalised_neighbours[new] = neighbours.iter().map(number).collect();
                 }
             }
         }
-        self.vertices = named;
+        self.vertices = count;
     }
 
-    /// Whether a vertex was only visited in the record, so that it can go without a trace.
-    pub(crate) fn is_recent(&self, vertex: u8) -> bool {
-        self.settled.get(usize::from(vertex)).is_some_and(|tally| tally.visits == 0) && self.before != vertex
-    }
-
-    pub(crate) fn settled_row(&self, vertex: u8) -> u32 {
-        self.settled_neighbours.get(usize::from(vertex)).copied().unwrap_or(0)
+    /// Whether all visits of a vertex are in the history.
+    pub(crate) fn is_recent(&self, vertex: VertexId) -> bool {
+        self.marginalised[vertex].visits == 0 && self.before != Some(vertex)
     }
 }
 
-pub(crate) fn join(rows: &mut [u32], a: u8, b: u8) {
-    for (from, to) in [(a, b), (b, a)] {
-        if let Some(row) = rows.get_mut(usize::from(from)) {
-            *row |= 1 << (to & 31);
-        }
-    }
+/// Joins two vertices by an edge.
+pub(crate) fn join<const V: usize>(neighbours: &mut PerVertex<VertexSet32, V>, a: VertexId, b: VertexId) {
+    neighbours[a].insert(b);
+    neighbours[b].insert(a);
 }
 
+/// ln of a count.
 pub(crate) fn ln(count: u8) -> f32 {
     libm::logf(f32::from(count))
 }
@@ -296,10 +255,14 @@ fn mix(value: u32) -> u32 {
     value ^ value >> 16
 }
 
-pub(crate) fn edge_key(a: u8, b: u8) -> u32 {
-    mix(0x1_0000 | u32::from(a.min(b)) << 8 | u32::from(a.max(b)))
+/// The part of an edge in the hash of a map.
+pub(crate) fn edge_key(a: VertexId, b: VertexId) -> u32 {
+    let [a, b] = [a, b].map(|vertex| u32::from(u8::from(vertex)));
+    mix(0x1_0000 | a.min(b) << 8 | a.max(b))
 }
 
-pub(crate) fn keyed(map_key: u32, vertices: u8, place: u8) -> u32 {
-    map_key ^ mix(0x2_0000 | u32::from(vertices) << 8 | u32::from(place))
+/// The hash of a map and the robot's vertex.
+pub(crate) fn keyed(map_key: u32, vertices: u8, at: Option<VertexId>) -> u32 {
+    let at = at.map_or(u8::MAX, u8::from);
+    map_key ^ mix(0x2_0000 | u32::from(vertices) << 8 | u32::from(at))
 }

@@ -1,225 +1,259 @@
-//! What a decoder needs of a hypothesis: how well each vertex explains a place, and what a move costs.
+//! The lattice of a history: for each observation a column of vertices that may explain it, and one walk along the columns that
+//! computes over all paths what a semiring says. [`Viterbi`](super::viterbi::Viterbi) walks with the maximum and the sum of
+//! logarithms, the [forward pass](super::forward::Forward) with the sum and the product of probabilities.
+//!
+//! A turn hint speaks of three successive vertices, so a cell of the walk stands for a pair of successive vertices. Where the
+//! next observation has no turn hint the vertex before does not matter, and one row of cells holds all pairs.
 
-use super::hypothesis::{Hypothesis, NOWHERE};
-use super::prices::{Prices, SHAPE, digamma};
-use super::record::{Entry, Record};
+use super::history::{ObservationHistory, PackedObservation};
+use super::hmm::Hmm;
+use super::model::Model;
+use crate::Turn;
+use crate::map::{VertexId, VertexSet32};
+use crate::top_k::TopK;
+use core::ops::{Index, IndexMut};
 
-/// How many vertices are considered for one place: those that explain its label best.
+/// How many vertices a column has at most.
 pub(super) const WIDTH: usize = 8;
 
-/// A vertex that explains a label so many nats worse than the best one is not considered.
-const REACH: f32 = 15.0;
+/// The position of a vertex in a column.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Slot(u8);
 
-/// The vertices considered for one place, the best first, and ln of how well they explain it.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Column {
-    pub(super) len: usize,
-    pub(super) vertices: [u8; WIDTH],
-    pub(super) fits: [f32; WIDTH],
+impl Slot {
+    pub(super) const FIRST: Self = Self(0);
+
+    /// The slot of the low bits of a number.
+    pub(super) const fn of_bits(bits: u16) -> Self {
+        Self(bits as u8 & (WIDTH as u8 - 1))
+    }
+
+    /// The number of the slot.
+    pub(super) const fn bits(self) -> u16 {
+        self.0 as u16 & (WIDTH as u16 - 1)
+    }
+
+    /// The slots of a column of some length.
+    pub(super) fn first(count: usize) -> impl ExactSizeIterator<Item = Self> + Clone {
+        (0..count.min(WIDTH) as u8).map(Self)
+    }
 }
+
+/// A value for each slot of a column.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct PerSlot<T>(pub(super) [T; WIDTH]);
+
+impl<T> Index<Slot> for PerSlot<T> {
+    type Output = T;
+
+    fn index(&self, slot: Slot) -> &T {
+        &self.0[usize::from(slot.bits())]
+    }
+}
+
+impl<T> IndexMut<Slot> for PerSlot<T> {
+    fn index_mut(&mut self, slot: Slot) -> &mut T {
+        &mut self.0[usize::from(slot.bits())]
+    }
+}
+
+/// A value for each pair of a slot in the column before and one in this column.
+pub(super) type Cells = PerSlot<PerSlot<f32>>;
+
+const fn cells(value: f32) -> Cells {
+    PerSlot([PerSlot([value; WIDTH]); WIDTH])
+}
+
+/// A vertex of a column, and the log likelihood of the observation there.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct State {
+    pub(super) vertex: VertexId,
+    pub(super) ln_emission: f32,
+}
+
+/// The vertices that explain one observation best, the best first.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Column(TopK<State, WIDTH>);
 
 impl Column {
-    pub(super) const EMPTY: Self = Self { len: 0, vertices: [NOWHERE; WIDTH], fits: [f32::NEG_INFINITY; WIDTH] };
+    pub(super) const EMPTY: Self = Self(TopK::new(State { vertex: VertexId::FIRST, ln_emission: 0.0 }));
 
-    pub(super) fn vertices(&self) -> &[u8] {
-        self.vertices.get(..self.len).unwrap_or(&[])
+    pub(super) fn clear(&mut self) {
+        self.0.clear();
     }
 
-    pub(super) fn iter(&self) -> impl Iterator<Item = (u8, f32)> + '_ {
-        self.vertices.iter().copied().zip(self.fits.iter().copied()).take(self.len)
+    pub(super) fn len(&self) -> usize {
+        self.0.as_slice().len()
     }
 
-    pub(super) fn position(&self, vertex: u8) -> usize {
-        self.vertices().iter().position(|&held| held == vertex).unwrap_or(WIDTH)
+    /// The states with their slots.
+    pub(super) fn iter(&self) -> impl Iterator<Item = (Slot, &State)> + Clone {
+        Slot::first(WIDTH).zip(self.0.as_slice())
     }
 
-    /// Makes a vertex one of those considered, in place of the last when there is no room.
-    pub(super) fn include(&mut self, vertex: u8, fit: f32) {
-        self.len = self.len.min(WIDTH - 1);
-        self.insert(vertex, fit);
+    /// The states.
+    pub(super) fn states_mut(&mut self) -> &mut [State] {
+        self.0.as_mut_slice()
     }
 
-    fn insert(&mut self, vertex: u8, fit: f32) {
-        let mut slot = self.len.min(WIDTH - 1);
-        if self.len == WIDTH && self.fits.last().is_some_and(|&worst| fit <= worst) {
-            return;
-        }
-        while slot > 0 {
-            let Some(&before) = self.fits.get(slot - 1) else { break };
-            if before >= fit {
-                break;
-            }
-            if let Some(to) = self.fits.get_mut(slot) {
-                *to = before;
-            }
-            let moved = self.vertices.get(slot - 1).copied().unwrap_or(NOWHERE);
-            if let Some(to) = self.vertices.get_mut(slot) {
-                *to = moved;
-            }
-            slot -= 1;
-        }
-        if let (Some(to), Some(held)) = (self.fits.get_mut(slot), self.vertices.get_mut(slot)) {
-            *to = fit;
-            *held = vertex;
-        }
-        self.len = (self.len + 1).min(WIDTH);
+    /// The vertex in a slot.
+    pub(super) fn vertex(&self, slot: Slot) -> Option<VertexId> {
+        self.0.as_slice().get(usize::from(slot.bits())).map(|state| state.vertex)
+    }
+
+    /// The largest log likelihood.
+    pub(super) fn best(&self) -> f32 {
+        self.0.as_slice().first().map_or(0.0, |state| state.ln_emission)
+    }
+
+    /// The slot of a vertex.
+    pub(super) fn slot_of(&self, vertex: VertexId) -> Option<Slot> {
+        self.iter().find(|(_, state)| state.vertex == vertex).map(|(slot, _)| slot)
+    }
+
+    pub(super) fn insert(&mut self, vertex: VertexId, ln_emission: f32) {
+        self.0.insert(State { vertex, ln_emission }, |one, other| one.ln_emission >= other.ln_emission);
+    }
+
+    /// Inserts a vertex in any case, in place of the last if there is no room.
+    pub(super) fn insert_always(&mut self, vertex: VertexId, ln_emission: f32) {
+        self.0.truncate(WIDTH - 1);
+        self.insert(vertex, ln_emission);
     }
 }
 
-/// The noise model of a vertex: its mean label, half the precision, and what does not depend on the label.
-#[derive(Clone, Copy, Debug)]
-struct Emission {
-    mean: f32,
-    half_precision: f32,
-    constant: f32,
+/// An observation of the walk.
+#[derive(Clone, Copy)]
+pub(super) struct Stage {
+    pub(super) index: usize,
+    pub(super) observation: PackedObservation,
+    /// Whether a sequence starts here, or the history.
+    pub(super) starts: bool,
+    /// Whether the observation before was the first of its sequence.
+    pub(super) is_second: bool,
 }
 
-/// The model of one hypothesis.
-#[derive(Clone, Debug)]
-pub(super) struct Model<const V: usize> {
-    vertices: u8,
-    emissions: [Emission; V],
-    ways: [u32; V],
-    /// ln of the probability of each way out of a vertex.
-    ln_exit: [f32; V],
-    exit: [f32; V],
-    neighbours: [u32; V],
-    /// Edges that were driven more than once.
-    firm: [u32; V],
-    has_degrees: bool,
-}
+/// A semiring, and what is noted on the walk.
+pub(super) trait Semiring {
+    /// The value of no path.
+    const ZERO: f32;
 
-/// Which emission a model has.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Weighing {
-    /// The density that the next label of the vertex would have: for decoding.
-    Predictive,
-    /// The expectation of the logarithm of the density under the posterior of the vertex: for the evidence.
-    Expected,
-}
+    /// All paths into a slot, over the slots before.
+    type Incoming: Copy;
 
-impl<const V: usize> Model<V> {
-    pub(super) const fn new() -> Self {
-        Self {
-            vertices: 0,
-            emissions: [Emission { mean: 0.0, half_precision: 0.0, constant: 0.0 }; V],
-            ways: [0; V],
-            ln_exit: [0.0; V],
-            exit: [0.0; V],
-            neighbours: [0; V],
-            firm: [0; V],
-            has_degrees: false,
-        }
-    }
+    /// Takes the column of the next observation: adds states to it, weighs it.
+    fn enter(&mut self, stage: &Stage, column: &mut Column);
 
-    pub(super) fn read<const T: usize>(
+    /// The value of all paths to the last observation of a sequence: a factor of those that start behind it.
+    fn close(&mut self, stage: &Stage, cells: &Cells, column: &Column) -> f32;
+
+    /// The value of the paths that start with a state, from the vertex before the history if there is one.
+    fn start(&mut self, closed: f32, from: Option<VertexId>, slot: Slot, state: &State) -> f32;
+
+    /// The weights of a transition that does not turn back, and of one that does.
+    fn turns(&mut self, hint: Option<Turn>) -> [f32; 2];
+
+    /// All paths into a slot of the column before; `None` when there is none. `rows` of the cells are in use; the slots before
+    /// do not matter when `is_first_order`.
+    fn incoming(
         &mut self,
-        prices: &Prices,
-        record: &Record<T>,
-        hypothesis: &Hypothesis<V, T>,
-        weighing: Weighing,
-    ) {
-        self.vertices = hypothesis.vertices;
-        self.neighbours = hypothesis.neighbours;
-        self.has_degrees = false;
-        for vertex in 0..hypothesis.vertices {
-            let slot = usize::from(vertex);
-            let tally = hypothesis.tally(vertex);
-            let visits = f32::from(tally.visits);
-            let shape = SHAPE + 0.5 * (visits - 1.0).max(0.0);
-            let scale = prices.scale + 0.5 * tally.scatter();
-            self.has_degrees |= tally.knows_degrees();
-            let ways = prices.likely_degree(&tally, hypothesis.degree(vertex));
-            let (half_precision, constant) = match weighing {
-                Weighing::Predictive => {
-                    let variance = scale / shape * (1.0 + 1.0 / visits.max(1.0));
-                    (0.5 / variance, -0.5 * libm::logf(variance))
-                }
-                Weighing::Expected => {
-                    (0.5 * shape / scale, -0.5 * (libm::logf(scale) - digamma(shape) + 1.0 / visits.max(1.0)))
-                }
-            };
-            if let (Some(emission), Some(ln_exit), Some(exit), Some(way)) = (
-                self.emissions.get_mut(slot),
-                self.ln_exit.get_mut(slot),
-                self.exit.get_mut(slot),
-                self.ways.get_mut(slot),
-            ) {
-                *emission = Emission { mean: tally.mean(), half_precision, constant };
-                *ln_exit = -libm::logf(ways as f32);
-                *exit = 1.0 / ways as f32;
-                *way = ways;
-            }
-        }
-        // The evidence counts every edge alike.
-        if weighing == Weighing::Predictive {
-            self.find_firm(record, hypothesis);
-        }
+        cells: &Cells,
+        rows: usize,
+        is_first_order: bool,
+        from: (Slot, &State),
+    ) -> Option<Self::Incoming>;
+
+    /// The value of all paths over one transition; `None` when there is none. `back` is the slot, two columns before, of the vertex
+    /// that the transition goes to, and the value of the paths that come from it and would turn back.
+    fn transition(
+        &mut self,
+        incoming: Self::Incoming,
+        back: (Option<Slot>, f32),
+        turns: [f32; 2],
+        from: &State,
+        to: (Slot, &State),
+    ) -> Option<f32>;
+
+    /// Adds the value of paths from a slot to those of a cell.
+    fn add(&mut self, cell: &mut f32, value: f32, from: Slot, to: Slot);
+
+    /// All transitions from a slot have been added.
+    fn leave(&mut self, stage: &Stage, slot: Slot, incoming: Self::Incoming);
+
+    /// All paths to an observation have been added. `None` ends the walk.
+    fn finish(&mut self, stage: &Stage, cells: &mut Cells, rows: usize) -> Option<()>;
+}
+
+/// The working memory of a walk.
+#[derive(Clone, Debug)]
+pub(super) struct Lattice {
+    cells: [Cells; 2],
+}
+
+impl Lattice {
+    pub(super) const fn new() -> Self {
+        Self { cells: [cells(0.0); 2] }
     }
 
-    fn find_firm<const T: usize>(&mut self, record: &Record<T>, hypothesis: &Hypothesis<V, T>) {
-        let mut once = [0_u32; V];
-        self.firm = [0; V];
-        for vertex in 0..hypothesis.vertices {
-            if let Some(firm) = self.firm.get_mut(usize::from(vertex)) {
-                *firm = hypothesis.settled_row(vertex);
-            }
-        }
-        let mut from = hypothesis.before;
-        for (entry, &vertex) in record.iter().zip(&hypothesis.path) {
-            if !entry.begins() && from != NOWHERE {
-                for (a, b) in [(from, vertex), (vertex, from)] {
-                    let bit = 1 << (b & 31);
-                    if let (Some(once), Some(firm)) = (once.get_mut(usize::from(a)), self.firm.get_mut(usize::from(a)))
-                    {
-                        *firm |= *once & bit;
-                        *once |= bit;
+    /// Walks along the history. Returns the column of the newest observation and the cells there.
+    ///
+    /// Cost: O(T · (V + WIDTH²)).
+    #[inline(always)]
+    pub(super) fn walk<S: Semiring, const V: usize, const T: usize>(
+        &mut self,
+        semiring: &mut S,
+        (model, history, hmm): (&Model, &ObservationHistory<T>, &Hmm<V>),
+        allowed: VertexSet32,
+        before: Option<VertexId>,
+    ) -> Option<(Column, &Cells)> {
+        let mut columns = [Column::EMPTY; 3];
+        let [cells, next] = &mut self.cells;
+        let mut rows = 0;
+        let mut is_second = false;
+        for (index, observation) in history.iter().enumerate() {
+            let [earlier, here, there] = &mut columns;
+            let starts = observation.starts_sequence() || index == 0;
+            let is_first_order = history.is_first_order(index);
+            let stage = Stage { index, observation, starts, is_second };
+            hmm.fill(model, observation, allowed, there);
+            semiring.enter(&stage, there);
+            *next = self::cells(S::ZERO);
+            if starts {
+                let closed = semiring.close(&stage, cells, here);
+                let from = if observation.starts_sequence() { None } else { before };
+                for (slot, state) in there.iter() {
+                    next[Slot::FIRST][slot] = semiring.start(closed, from, slot, state);
+                }
+            } else {
+                let hint = if is_second { None } else { observation.turn() };
+                let turns = semiring.turns(hint);
+                // Where the paths come from that turn back to a vertex.
+                let mut back = PerSlot([None; WIDTH]);
+                if hint.is_some() {
+                    for (slot, state) in there.iter() {
+                        back[slot] = earlier.slot_of(state.vertex);
                     }
                 }
+                for (slot, from) in here.iter() {
+                    let Some(incoming) = semiring.incoming(cells, rows, hint.is_none(), (slot, from)) else { continue };
+                    let row = if is_first_order { Slot::FIRST } else { slot };
+                    for (to_slot, to) in there.iter() {
+                        let back = back[to_slot];
+                        let returning = back.map_or(S::ZERO, |back| cells[back][slot]);
+                        let value = semiring.transition(incoming, (back, returning), turns, from, (to_slot, to));
+                        if let Some(value) = value {
+                            semiring.add(&mut next[row][to_slot], value, slot, to_slot);
+                        }
+                    }
+                    semiring.leave(&stage, slot, incoming);
+                }
             }
-            from = vertex;
+            rows = if starts || is_first_order { 1 } else { here.len() };
+            semiring.finish(&stage, next, rows)?;
+            is_second = starts;
+            core::mem::swap(cells, next);
+            columns.rotate_left(1);
         }
-    }
-
-    /// ln of the probability of a move, without the choice of the way: 0 along an established edge.
-    pub(super) fn is_firm(&self, from: u8, to: u8) -> bool {
-        self.firm.get(usize::from(from)).is_some_and(|row| row >> (to & 31) & 1 == 1)
-    }
-
-    pub(super) fn is_edge(&self, from: u8, to: u8) -> bool {
-        self.neighbours.get(usize::from(from)).is_some_and(|row| row >> (to & 31) & 1 == 1)
-    }
-
-    pub(super) fn ln_exit(&self, from: u8) -> f32 {
-        self.ln_exit.get(usize::from(from)).copied().unwrap_or(0.0)
-    }
-
-    pub(super) fn exit(&self, from: u8) -> f32 {
-        self.exit.get(usize::from(from)).copied().unwrap_or(0.0)
-    }
-
-    /// ln of how well a vertex explains a place.
-    pub(super) fn fit(&self, prices: &Prices, vertex: u8, entry: Entry) -> f32 {
-        let slot = usize::from(vertex);
-        let Some(emission) = self.emissions.get(slot) else { return f32::NEG_INFINITY };
-        let off = f32::from(entry.steps) - emission.mean;
-        let fit = emission.constant - off * off * emission.half_precision;
-        if !self.has_degrees || entry.degree() == 0 {
-            return fit;
-        }
-        fit + prices.degree(entry.degree(), self.ways.get(slot).copied().unwrap_or(1))
-    }
-
-    /// The vertices to consider for a place; `allowed` is a bit row.
-    pub(super) fn column(&self, prices: &Prices, entry: Entry, allowed: u32, column: &mut Column) {
-        column.len = 0;
-        for vertex in (0..self.vertices).filter(|vertex| allowed >> (vertex & 31) & 1 == 1) {
-            let fit = self.fit(prices, vertex, entry);
-            let best = if column.len == 0 { f32::NEG_INFINITY } else { column.fits.first().copied().unwrap_or(0.0) };
-            // Two stay in any case: no place follows itself, so one alone would lead nowhere.
-            if fit >= best - REACH || column.len < 2 {
-                column.insert(vertex, fit);
-            }
-        }
+        Some((columns[1], cells))
     }
 }

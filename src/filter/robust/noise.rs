@@ -1,58 +1,69 @@
-//! The scale of the noise, taken from what was observed, so that the configured one is only a first guess.
+//! The standard deviation of the labels, estimated from the observations. The configured one is a first guess.
 
+use super::history::ObservationHistory;
 use super::hypothesis::Hypothesis;
-use super::record::Record;
 
-/// Differences from this many steps on are counted as one.
+/// Differences from this many steps on are counted together.
 const DIFFERENCES: usize = 128;
 
-/// The share of differences over two places that the estimate reads off. A robot that chooses its way at random turns
-/// back at two places of five, so this is near the middle of the differences between two visits of one place.
+/// The quantile of the differences over two places that the estimate uses.
+///
+/// A robot that chooses its exits at random turns back at about two places of five: two of five differences are between
+/// visits of one place, and most others are larger. So this quantile is about the median of those two fifths.
 const QUANTILE: f32 = 0.2;
 
-/// That quantile of the differences, in standard deviations of a label, when two of five are visits of one place.
-const DEVIATIONS: f32 = 0.82;
+/// That quantile in standard deviations s of a label. The difference between two labels of one place is normal with standard
+/// deviation √2 s, so it is below 0.82 s with probability erf(0.82 / 2) = 0.44. Two fifths of that are 0.175 of all
+/// differences; the remaining 0.025 allow for 4 % of the differences between other places.
+const QUANTILE_DEVIATIONS: f32 = 0.82;
 
-/// By how much the scatter of the map may exceed what the differences show.
+/// How many times the estimate from the differences the estimate from the map may be.
 const TOLERANCE: f32 = 1.5;
 
-/// The smallest estimate in steps of coarse fingerprints: labels that all fall into one step show no scatter at all.
+/// The smallest estimate in steps of the fingerprints: labels that all fall into one step show no scatter.
 const RESOLUTIONS: f32 = 0.7;
 
 /// The range of the estimate, in steps.
 const SMALLEST_STEPS: f32 = 2.0;
 const LARGEST_STEPS: f32 = 150.0;
 
-/// The standard deviation of the labels in steps, when there is enough to tell it from.
+/// The standard deviation of the labels in steps; `None` if no vertex has two visits.
 ///
-/// It is that of the labels about the means of their vertices, pooled over a map. A map that takes several places for one
-/// shows too much; so it is limited by the differences between a place and the place before the last, which are small
-/// whenever the robot turned back, whatever the map. A robot that never turns back has no such limit. Cost: O(T).
+/// ```text
+/// s = min(√(Σ Q / Σ (n − 1)), 1.5 q / 0.82)
+/// ```
+///
+/// The first term is the scatter about the vertices, pooled over the map. A map that takes several places for one has too much
+/// scatter and would justify itself, so the second term limits it: q is the 0.2 quantile of the differences between each
+/// label and the second last one before it, which are small wherever the robot turned back, whatever the map is. A robot that
+/// never turns back has no such limit. The result is limited to the resolution of the fingerprints, and to 4 to 300 mm.
+/// Cost: O(T).
 pub(super) fn deviation_steps<const V: usize, const T: usize>(
-    record: &Record<T>,
+    history: &ObservationHistory<T>,
     best: &Hypothesis<V, T>,
     resolution_steps: f32,
 ) -> Option<f32> {
     let mut scatter = 0.0;
     let mut freedom = 0.0;
-    for tally in best.tallies.iter().take(usize::from(best.vertices)).filter(|tally| tally.visits >= 2) {
-        scatter += tally.scatter();
-        freedom += f32::from(tally.visits - 1);
+    for statistics in best.vertices().map(|vertex| &best.statistics[vertex]).filter(|vertex| vertex.visits >= 2) {
+        scatter += statistics.scatter;
+        freedom += f32::from(statistics.visits - 1);
     }
     if freedom == 0.0 {
         return None;
     }
     let pooled = libm::sqrtf(scatter / freedom);
     let smallest = SMALLEST_STEPS.max(RESOLUTIONS * resolution_steps);
-    Some(pooled.min(TOLERANCE * returning_deviation(record)).min(LARGEST_STEPS).max(smallest))
+    Some(pooled.min(TOLERANCE * deviation_of_returns(history)).min(LARGEST_STEPS).max(smallest))
 }
 
-fn returning_deviation<const T: usize>(record: &Record<T>) -> f32 {
+/// q / 0.82 of [`deviation_steps`]; the largest estimate if the robot does not turn back.
+fn deviation_of_returns<const T: usize>(history: &ObservationHistory<T>) -> f32 {
     let mut counts = [0_u16; DIFFERENCES];
     let mut pairs = 0_u16;
-    let triples = record.iter().zip(record.iter().skip(1)).zip(record.iter().skip(2));
+    let triples = history.iter().zip(history.iter().skip(1)).zip(history.iter().skip(2));
     for ((first, middle), last) in triples {
-        if middle.begins() || last.begins() {
+        if middle.starts_sequence() || last.starts_sequence() {
             continue;
         }
         let difference = usize::from(first.steps.abs_diff(last.steps)).min(DIFFERENCES - 1);
@@ -68,7 +79,7 @@ fn returning_deviation<const T: usize>(record: &Record<T>) -> f32 {
         f32::from(below) >= wanted
     });
     match quantile {
-        Some(steps) if steps + 1 < DIFFERENCES => (steps as f32 + 0.5) / DEVIATIONS,
+        Some(steps) if steps + 1 < DIFFERENCES => (steps as f32 + 0.5) / QUANTILE_DEVIATIONS,
         _ => LARGEST_STEPS,
     }
 }

@@ -1,17 +1,17 @@
 //! The robust filter in a snapshot: everything that cannot be recomputed from the places and the paths.
 //!
-//! Of a hypothesis a snapshot has the path and the counts of places that left the record; map, counts and evidence are
+//! Of a hypothesis a snapshot has the path and the marginalised statistics; map, statistics and evidence are
 //! recomputed. Saving recomputes them in the running filter too, so that it and a restored one are equal, bit for bit.
 
 mod hypothesis;
 mod parts;
 
 use crate::FaultCounters;
-use crate::filter::robust::worst;
+use crate::filter::robust::worst_ngram;
 use crate::persist::Persist;
 use crate::persist::snapshot::{FILTER_SECTION, FRAME_BYTES, Reader, SnapshotError, Writer};
 use crate::{RobustConfig, RobustFilter};
-use parts::{TALLY_BYTES, path_bytes, row_bytes};
+use parts::{STATISTICS_BYTES, path_bytes, row_bytes};
 
 /// What the contents of the filter's section begin with.
 const ROBUST: u8 = 1;
@@ -19,13 +19,13 @@ const ROBUST: u8 = 1;
 /// The scale of the noise is within these, in steps².
 const SCALES: core::ops::RangeInclusive<f32> = 0.1..=1e6;
 
-/// What is neither record, map nor hypothesis.
+/// What is neither history, map nor hypothesis.
 #[derive(Clone, Copy)]
 struct Head {
     config: RobustConfig,
     seed: u64,
     observed: u32,
-    polished: u32,
+    refinements: u32,
     localise_only: bool,
     scale: f32,
 }
@@ -35,7 +35,7 @@ const HEAD_BYTES: usize = 4 + 10 + 8 + 4 + 4 + 1 + 4;
 impl<const N: usize, const V: usize, const HISTORY: usize> RobustFilter<N, V, HISTORY> {
     /// The largest snapshot of this filter alone, in bytes: with `N` hypotheses of `V` vertices and a full history.
     pub const SNAPSHOT_BYTES: usize = {
-        let counted = V * (TALLY_BYTES + row_bytes(V));
+        let counted = V * (STATISTICS_BYTES + row_bytes(V));
         let told = 1 + V * (11 + row_bytes(V)) + 4 + 1 + V + path_bytes(V, HISTORY);
         let hypothesis = hypothesis::FIXED_BYTES + path_bytes(V, HISTORY) + counted;
         FRAME_BYTES + HEAD_BYTES + 2 + 3 * HISTORY + told + 1 + hypothesis::KEPT_BYTES + counted + N * hypothesis
@@ -56,11 +56,11 @@ impl<const N: usize, const V: usize, const HISTORY: usize> Persist for RobustFil
     fn save(&mut self, writer: &mut Writer<'_>) -> Result<(), SnapshotError> {
         self.make_canonical();
         self.head().save::<V, HISTORY>(writer)?;
-        self.record.save(writer)?;
+        self.history.save(writer)?;
         self.save_told(writer)?;
         let count_at = writer.mark();
         writer.u8(0)?;
-        let len = self.record.len();
+        let len = self.history.len();
         if self.localise_only
             && let Some(best) = self.beam.get(0)
         {
@@ -113,7 +113,7 @@ impl<const N: usize, const V: usize, const HISTORY: usize> RobustFilter<N, V, HI
         if kept {
             self.take_head(&head);
         }
-        self.record.read(&mut from, len, kept)?;
+        self.history.read(&mut from, len, kept)?;
         let told_vertices = self.read_told(&mut from, len, kept)?;
         let count = from.u8()?;
         if count == 0 || count > head.config.hypotheses {
@@ -130,13 +130,13 @@ impl<const N: usize, const V: usize, const HISTORY: usize> RobustFilter<N, V, HI
             self.draft.read(&mut from, len, head.localise_only)?;
             if kept {
                 if !head.localise_only {
-                    self.draft.recount(&self.prices, &self.record);
+                    self.draft.recount(&self.model, &self.history);
                 }
                 self.beam.append(&self.draft);
             }
         }
         if kept {
-            self.worst = worst::worst_ngram(&self.record, &self.map, self.names.path());
+            self.worst = worst_ngram::worst_ngram(&self.history, &self.map, &self.vertex_ids.path);
         }
         from.finish()
     }
@@ -148,11 +148,11 @@ impl<const N: usize, const V: usize, const HISTORY: usize> RobustFilter<N, V, HI
             if let Some(best) = self.beam.get(0) {
                 self.draft.clone_from(best);
                 let kept = &self.draft;
-                self.beam.each(|hypothesis| hypothesis.keep_map_of(kept));
+                self.beam.for_each(|hypothesis| hypothesis.keep_map_of(kept));
             }
         } else {
-            let (prices, record) = (&self.prices, &self.record);
-            self.beam.each(|hypothesis| hypothesis.recount(prices, record));
+            let (model, history) = (&self.model, &self.history);
+            self.beam.for_each(|hypothesis| hypothesis.recount(model, history));
             self.beam.sort();
         }
     }
@@ -162,9 +162,9 @@ impl<const N: usize, const V: usize, const HISTORY: usize> RobustFilter<N, V, HI
             config: self.config,
             seed: self.seed,
             observed: self.observed,
-            polished: self.polished,
+            refinements: self.refinements,
             localise_only: self.localise_only,
-            scale: self.prices.scale,
+            scale: self.model.scale,
         }
     }
 
@@ -172,11 +172,11 @@ impl<const N: usize, const V: usize, const HISTORY: usize> RobustFilter<N, V, HI
         self.config = head.config;
         self.seed = head.seed;
         self.observed = head.observed;
-        self.polished = head.polished;
+        self.refinements = head.refinements;
         self.localise_only = head.localise_only;
-        self.prices.configure(&head.config);
-        self.prices.set_scale(head.scale);
-        self.beam.begin_empty();
+        self.model.configure(&head.config);
+        self.model.set_scale(head.scale);
+        self.beam.start_empty();
         self.faults = FaultCounters::new();
     }
 }
@@ -194,7 +194,7 @@ impl Head {
         writer.u16(self.config.wrong_degree_permille)?;
         writer.u64(self.seed)?;
         writer.u32(self.observed)?;
-        writer.u32(self.polished)?;
+        writer.u32(self.refinements)?;
         writer.u8(self.localise_only.into())?;
         writer.f32(self.scale)
     }
@@ -218,7 +218,7 @@ impl Head {
             return Err(SnapshotError::Capacities);
         }
         config.check(N).map_err(|_| SnapshotError::Contents)?;
-        let (seed, observed, polished) = (from.u64()?, from.u32()?, from.u32()?);
+        let (seed, observed, refinements) = (from.u64()?, from.u32()?, from.u32()?);
         let localise_only = match from.u8()? {
             0 => false,
             1 => true,
@@ -228,6 +228,6 @@ impl Head {
         if !SCALES.contains(&scale) {
             return Err(SnapshotError::Contents);
         }
-        Ok(Self { config, seed, observed, polished, localise_only, scale })
+        Ok(Self { config, seed, observed, refinements, localise_only, scale })
     }
 }

@@ -31,7 +31,7 @@ impl Belief {
     pub fn of<const V: usize>(filter: &impl Filter<V>, place_index: u32) -> Self {
         let mut most_probable = [VertexProbability::default(); 8];
         for vertex in filter.map().vertices() {
-            let permille = permille(filter.place_probability_q16(vertex));
+            let permille = permille(filter.vertex_probability_q16(vertex));
             let mut candidate = VertexProbability { vertex: vertex.into(), permille };
             for slot in &mut most_probable {
                 if candidate.permille > slot.permille {
@@ -79,8 +79,8 @@ impl Remapped {
     /// The id changes of a filter's last update among the first `vertices` ids; `None` if no id changed.
     pub fn of<const V: usize>(filter: &impl Filter<V>, vertices: u8, place_index: u32) -> Option<Self> {
         let mut before = VertexId::first(vertices.into());
-        let last_changed = before.rfind(|&vertex| filter.renamed(vertex) != Some(vertex))?;
-        let new_id = |vertex| filter.renamed(vertex).map_or(Self::REMOVED, u8::from);
+        let last_changed = before.rfind(|&vertex| filter.remapped(vertex) != Some(vertex))?;
+        let new_id = |vertex| filter.remapped(vertex).map_or(Self::REMOVED, u8::from);
         let new_ids = VertexId::first(last_changed.index() + 1).map(new_id);
         Some(Self { place_index, vertices: List::new(new_ids) })
     }

@@ -8,7 +8,7 @@ use std::{
     num::NonZeroUsize,
     path::{Path, PathBuf},
 };
-use toposlam::{Config, Direction, NgramLength, RobustConfig};
+use toposlam::{Direction, NgramLength, PaperConfig, RobustConfig};
 use toposlam_cli::progress::Progress;
 use toposlam_eval::{
     case::{Case, Placements},
@@ -94,7 +94,7 @@ struct CourseArguments {
     #[arg(long, value_name = "B", default_value_t = 12, value_parser = clap::value_parser!(u32).range(1..=12))]
     fingerprint_bits: u32,
     /// Labels per n-gram, 2 to 7.
-    #[arg(long, value_name = "n", default_value_t = Config::DEFAULT.ngram_length)]
+    #[arg(long, value_name = "n", default_value_t = PaperConfig::DEFAULT.ngram_length)]
     ngram_length: u8,
     /// Threads; 0 for one per processor.
     #[arg(long, value_name = "THREADS", default_value_t = 0)]
@@ -325,7 +325,7 @@ impl FilterArguments {
     }
 
     fn paper(&self) -> Filter {
-        let default = Config::DEFAULT;
+        let default = PaperConfig::DEFAULT;
         Filter::Paper(
             default
                 .with_particles(self.hypotheses.unwrap_or(default.particles))

@@ -8,7 +8,8 @@ use crate::{
     trial::Trial,
 };
 use std::ptr;
-use toposlam::{Config, FaultKind, Fingerprint, Map, Observation, PaperFilter, Prior, VertexId};
+use toposlam::Filter as _;
+use toposlam::{FaultKind, Fingerprint, Map, Observation, PaperConfig, PaperFilter, Prior, VertexId};
 
 /// How many places a path can visit without a prior.
 pub(super) const MAX_PLACES: usize = 2048;
@@ -38,7 +39,7 @@ struct Particles<const WORDS: usize> {
 impl<const WORDS: usize> Particles<WORDS> {
     fn start(settings: &Settings, trial: &Trial) -> Self {
         let mut filter = Box::new(PaperFilter::new());
-        let config = if let Filter::Paper(config) = settings.filter { config } else { Config::DEFAULT };
+        let config = if let Filter::Paper(config) = settings.filter { config } else { PaperConfig::DEFAULT };
         let started = filter.start(config, trial.filter_seed);
         assert!(started.is_ok(), "the configuration was checked");
         Self { filter, ancestry: Ancestry::new() }

@@ -5,6 +5,7 @@ use crate::{
     settings::{EvaluationError, Filter, Settings},
     trial::Trial,
 };
+use toposlam::Filter as _;
 use toposlam::{FaultKind, Fingerprint, Map, Observation, RobustConfig, RobustFilter, VertexId};
 
 /// How many vertices a map of the robust filter can have.
@@ -43,7 +44,7 @@ impl<const N: usize, const HISTORY: usize> Candidate for Robust<N, HISTORY> {
     }
 
     fn refine(&mut self, steps: u32) {
-        (0..steps).for_each(|_| self.0.polish());
+        (0..steps).for_each(|_| self.0.refine());
     }
 
     fn search_from(&self, path: &[VertexId], steps: u32) -> Option<(Map<VERTICES>, Vec<usize>)> {
