@@ -72,15 +72,6 @@ fn sine(bearing_mrad: i16) -> i32 {
     if bearing_mrad < 0 { -sine } else { sine }
 }
 
-/// Inserts an angle into a slice in ascending order; the largest one drops out.
-pub(crate) fn insert_ascending(angles_mrad: &mut [i16], mut angle_mrad: i16) {
-    for slot in angles_mrad {
-        if angle_mrad < *slot {
-            core::mem::swap(slot, &mut angle_mrad);
-        }
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -60,6 +60,14 @@ impl<T: Copy, const K: usize> TopK<T, K> {
     }
 }
 
+impl<T: PartialEq + Copy, const K: usize> PartialEq for TopK<T, K> {
+    fn eq(&self, other: &Self) -> bool {
+        self.as_slice() == other.as_slice()
+    }
+}
+
+impl<T: Eq + Copy, const K: usize> Eq for TopK<T, K> {}
+
 /// Puts an item in place of the last one, and then ahead of those that do not go first.
 fn rise<T: Copy>(items: &mut [T], item: T, goes_first: impl Fn(&T, &T) -> bool) {
     let Some((mut slot, ahead)) = items.split_last_mut() else { return };

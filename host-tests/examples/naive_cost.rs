@@ -7,7 +7,7 @@
 //! The naive implementation weighs all N · (K + 1) predictions, equal particles each for itself. For each prediction it
 //! lists the n-grams of the predicted map and of the history, distinct up to reversal, and compares each with each, once
 //! for every half of Eq. 2 that the direction takes. Listing them, which it would have to do as well, is not counted.
-//! The comparisons are counted, not made: the sizes of the two sets tell their number.
+//! The comparisons are counted, not made: their number follows from the sizes of the two sets.
 
 use std::collections::VecDeque;
 use std::process::exit;

@@ -1,15 +1,15 @@
-//! The evidence that the robust filter weighs hypotheses by, from its definition.
+//! The evidence of a hypothesis of the robust filter, from its definition (docs/inference.md).
 //!
-//! A hypothesis says of every observation which vertex it was made at: a [`Path`]. Observations come in sequences; within
-//! one the robot drove from each place to the next. With `K` vertices and `E` edges, the pairs of vertices that follow each
-//! other in a sequence, the evidence is
+//! A hypothesis is the vertex of each observation, a [`Path`]. Within a sequence of observations the robot drove from each place
+//! to the next. With `K` vertices, and `E` edges between the pairs of vertices that follow each other in a sequence, the
+//! evidence is
 //!
 //! ```text
-//! S = Σ_v ln labels(v)  +  Σ_v ln exits(v)  +  Σ_t ln turn(t)  -  sequences · ln K  -  VERTEX · K  -  EDGE · E
+//! S = Σ_v ln labels(v)  +  Σ_v ln exits(v)  +  Σ_t ln turn(t)  −  sequences · ln K  +  LN_VERTEX · K  +  LN_EDGE · E
 //! ```
 //!
-//! [`ln_labels`], [`ln_exits`], [`ln_turn`] give the terms. To it comes a share of [`AllPaths::surplus`], what the other
-//! paths through the same map add. Labels are counted in steps of 2 mm; logarithms are natural.
+//! with the terms of [`ln_labels`], [`ln_exits`] and [`ln_turn`]. A share of [`AllPaths::bound`], the bound of the map's other
+//! paths, counts as well. Labels are in steps of 2 mm; logarithms are natural.
 
 use std::collections::BTreeSet;
 
@@ -17,46 +17,46 @@ use std::collections::BTreeSet;
 pub const LABEL_RANGE: f64 = 1000.0;
 /// The shape of the inverse-gamma prior of the variance of a vertex.
 pub const SHAPE: f64 = 2.0;
-/// The price of a vertex.
-pub const VERTEX: f64 = -1.0;
-/// The price of an edge.
-pub const EDGE: f64 = 1.5;
-/// How much of the surplus counts.
-pub const SURPLUS_SHARE: f64 = 0.7;
-/// A priori a vertex has 1 to 7 ways; more are seen as 7.
-pub const MOST_WAYS: usize = 7;
+/// The log prior of a vertex.
+pub const LN_VERTEX: f64 = 1.0;
+/// The log prior of an edge.
+pub const LN_EDGE: f64 = -1.5;
+/// The share of the bound of the other paths that counts.
+pub const OTHER_PATHS_SHARE: f64 = 0.7;
+/// A priori a vertex has 1 to 7 exits; more are observed as 7.
+pub const MOST_EXITS: usize = 7;
 
-/// One visit to a place.
+/// An observation of a place.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Observation {
-    /// The label that was seen, in steps.
+    /// The label, in steps.
     pub label: f64,
-    /// Whether the robot says that it drove back along the edge it had come by; `None` when it does not say.
+    /// The turn hint: whether the robot drove back along the edge by which it had come.
     pub turned_back: Option<bool>,
-    /// How many ways the robot counted, 1 to 7.
+    /// The observed degree, 1 to 7.
     pub degree: Option<usize>,
-    /// Whether a new sequence starts here.
+    /// Whether a sequence starts here.
     pub starts_sequence: bool,
 }
 
-/// The noise of what is observed.
+/// The noise of the observations.
 #[derive(Clone, Copy, Debug)]
 pub struct Noise {
-    /// The standard deviation of a label that is expected, in steps.
+    /// The standard deviation of a label, in steps.
     pub deviation: f64,
-    /// The probability that a turn is told wrong.
+    /// The probability that a turn hint is wrong.
     pub wrong_turn: f64,
-    /// The probability that a degree is told wrong.
+    /// The probability that a degree is wrong.
     pub wrong_degree: f64,
 }
 
-/// Which vertex each observation was made at; vertices are numbered from 0 without gaps.
+/// The vertex of each observation; vertices are numbered from 0 without gaps.
 pub type Path = [usize];
 
-/// Observations, the vertex of each, and the noise: what is weighed.
+/// A hypothesis: observations, the vertex of each, and the noise.
 #[derive(Clone, Copy, Debug)]
-pub struct Weighed<'a> {
-    /// What was observed; the first observation starts a sequence.
+pub struct Hypothesis<'a> {
+    /// The observations; the first one starts a sequence.
     pub observations: &'a [Observation],
     /// The vertex of each observation.
     pub path: &'a Path,
@@ -64,7 +64,7 @@ pub struct Weighed<'a> {
     pub noise: Noise,
 }
 
-/// ln of the density of labels that share an unknown mean, uniform over `R` = [`LABEL_RANGE`], and an unknown variance,
+/// The log density of labels that share an unknown mean, uniform over `R` = [`LABEL_RANGE`], and an unknown variance,
 /// inverse-gamma with shape `a` = [`SHAPE`] and scale `b` = a · deviation². With `n` labels and `SS` the sum of squared
 /// distances from their mean
 ///
@@ -81,35 +81,35 @@ pub fn ln_labels(labels: &[f64], deviation: f64) -> f64 {
         - shape * (scale + scatter(labels) / 2.0).ln()
 }
 
-/// ln of the probability of so many exits of a vertex with `degree` edges, each by one of its ways, all alike.
+/// The log probability of the transitions out of a vertex with `degree` edges, each by one of its exits with the same probability.
 ///
-/// A vertex where no degree was seen has no other ways than its edges: −exits · ln degree. Else it may have `w` ways,
-/// from `degree` to 7, each number with probability 1/7: ln Σ_w 1/7 · w^−exits · Π P(seen | w), [`degree_probability`].
+/// A vertex without an observed degree has no other exits than its edges: −exits · ln degree. Otherwise it has `d` exits,
+/// `degree` to 7, each number with probability 1/7: ln Σ_d 1/7 · d^−exits · Π P(observed | d), [`degree_probability`].
 pub fn ln_exits(exits: usize, degree: usize, seen: &[usize], noise: Noise) -> f64 {
     let degree = degree.max(1);
     if seen.is_empty() {
         return -(exits as f64) * (degree as f64).ln();
     }
-    let ln_term = |ways: usize| ln_exits_by(ways, exits, seen, noise);
-    ln_sum((degree..=degree.max(MOST_WAYS)).map(ln_term)) - (MOST_WAYS as f64).ln()
+    let ln_term = |degree: usize| ln_exits_by(degree, exits, seen, noise);
+    ln_sum((degree..=degree.max(MOST_EXITS)).map(ln_term)) - (MOST_EXITS as f64).ln()
 }
 
-fn ln_exits_by(ways: usize, exits: usize, seen: &[usize], noise: Noise) -> f64 {
-    let ln_seen = seen.iter().map(|&seen| degree_probability(seen, ways, noise.wrong_degree).ln());
-    ln_seen.sum::<f64>() - exits as f64 * (ways as f64).ln()
+fn ln_exits_by(degree: usize, exits: usize, seen: &[usize], noise: Noise) -> f64 {
+    let ln_seen = seen.iter().map(|&seen| degree_probability(seen, degree, noise.wrong_degree).ln());
+    ln_seen.sum::<f64>() - exits as f64 * (degree as f64).ln()
 }
 
-/// The probability of a degree that is seen where there are so many ways: `1 − e` for the right one, `e/2` for one more
-/// or less, `e/100` for any other; more than 7 ways are seen as 7.
-pub fn degree_probability(seen: usize, ways: usize, wrong: f64) -> f64 {
-    match seen.abs_diff(ways.min(MOST_WAYS)) {
+/// The probability of an observed degree: `1 − e` for the right one, `e/2` for one that is off by one, `e/100` for any other.
+/// More than 7 exits are observed as 7.
+pub fn degree_probability(observed: usize, degree: usize, wrong: f64) -> f64 {
+    match observed.abs_diff(degree.min(MOST_EXITS)) {
         0 => 1.0 - wrong,
         1 => wrong / 2.0,
         _ => wrong / 100.0,
     }
 }
 
-/// ln of the probability of what the robot says of its turn, given whether it is back at the place before the last.
+/// The log probability of a turn hint, given whether the path is back at the second last vertex.
 pub fn ln_turn(turned_back: Option<bool>, is_back: bool, wrong: f64) -> f64 {
     match turned_back {
         None => 0.0,
@@ -118,7 +118,7 @@ pub fn ln_turn(turned_back: Option<bool>, is_back: bool, wrong: f64) -> f64 {
     }
 }
 
-/// What a vertex was seen as.
+/// The observations of a vertex.
 #[derive(Clone, Debug, Default)]
 struct Vertex {
     labels: Vec<f64>,
@@ -127,16 +127,16 @@ struct Vertex {
     neighbours: BTreeSet<usize>,
 }
 
-/// What the paths through a map are worth together.
+/// All paths through a map.
 #[derive(Clone, Debug)]
 pub struct AllPaths {
-    /// −ln of the probability of the one path among all.
-    pub surplus: f64,
-    /// The probability of each vertex at the newest place.
-    pub places: Vec<f64>,
+    /// The bound of the other paths: −ln P(path | map, observations).
+    pub bound: f64,
+    /// The probability of each vertex at the newest observation.
+    pub belief: Vec<f64>,
 }
 
-impl Weighed<'_> {
+impl Hypothesis<'_> {
     /// The number of vertices.
     pub fn vertices(&self) -> usize {
         self.path.iter().max().map_or(0, |last| last + 1)
@@ -149,7 +149,7 @@ impl Weighed<'_> {
         (1..self.path.len()).filter(follows).map(edge).collect()
     }
 
-    fn tallied(&self) -> Vec<Vertex> {
+    fn observed_vertices(&self) -> Vec<Vertex> {
         let mut vertices = vec![Vertex::default(); self.vertices()];
         for (at, (seen, &vertex)) in self.observations.iter().zip(self.path).enumerate() {
             vertices[vertex].labels.push(seen.label);
@@ -165,54 +165,53 @@ impl Weighed<'_> {
         vertices
     }
 
-    /// The labels that were seen at each vertex.
+    /// The labels of each vertex.
     pub fn labels(&self) -> Vec<Vec<f64>> {
-        self.tallied().into_iter().map(|vertex| vertex.labels).collect()
+        self.observed_vertices().into_iter().map(|vertex| vertex.labels).collect()
     }
 
-    /// `S`: ln of the evidence of the path and its map.
+    /// `S`: the log evidence of the path and its map.
     pub fn evidence(&self) -> f64 {
-        let vertices = self.tallied();
+        let vertices = self.observed_vertices();
         let of_vertex = |vertex: &Vertex| {
             ln_labels(&vertex.labels, self.noise.deviation)
                 + ln_exits(vertex.exits, vertex.neighbours.len(), &vertex.degrees, self.noise)
         };
         let sequences = self.observations.iter().filter(|seen| seen.starts_sequence).count() as f64;
         let size = vertices.len() as f64;
-        vertices.iter().map(of_vertex).sum::<f64>() + self.ln_turns(self.path, 0)
-            - sequences * size.ln()
-            - VERTEX * size
-            - EDGE * self.edges().len() as f64
+        vertices.iter().map(of_vertex).sum::<f64>() + self.ln_turns(self.path, 0) - sequences * size.ln()
+            + LN_VERTEX * size
+            + LN_EDGE * self.edges().len() as f64
     }
 
-    /// ln of the probability of all that was said about turns along a path that starts at an observation. Of the first two
-    /// places of a sequence nothing can be said.
+    /// The log probability of all turn hints along a path from an observation on. At the first two places of a sequence a hint has
+    /// no meaning.
     fn ln_turns(&self, path: &Path, first: usize) -> f64 {
         let starts = |at: usize| self.observations[first + at].starts_sequence;
-        let is_told = |at: &usize| !starts(*at) && !starts(at - 1);
+        let counts = |at: &usize| !starts(*at) && !starts(at - 1);
         let ln = |at: usize| {
             ln_turn(self.observations[first + at].turned_back, path[at] == path[at - 2], self.noise.wrong_turn)
         };
-        (2..path.len()).filter(is_told).map(ln).sum()
+        (2..path.len()).filter(counts).map(ln).sum()
     }
 
-    /// The other paths: every walk through the map for each sequence, by enumeration.
+    /// All paths: every walk through the map for each sequence, by enumeration.
     ///
-    /// A path starts a sequence at any of the `K` vertices, leaves each vertex by one of its ways, the most likely number
-    /// of them, and explains each label at its vertex by the expectation of the logarithm of its density under what the
-    /// path that is weighed says of the vertex. With `n` labels of mean `m`, shape `a' = a + (n-1)/2` and scale
-    /// `b' = b + SS/2` that is, up to what all have in common,
+    /// A path starts a sequence at any of the `K` vertices with the same probability, and takes each exit of a vertex, of the most
+    /// likely number of exits, with the same probability. The likelihood of a label at a vertex is the expectation of its log
+    /// density under the posterior of the vertex by the path of the hypothesis. With `n` labels of mean `m`, shape
+    /// `a' = a + (n-1)/2` and scale `b' = b + SS/2` it is, up to a constant,
     ///
     /// ```text
     /// -½ (ln b' - ψ(a') + 1/n) - (label - m)² a' / 2b'
     /// ```
     ///
-    /// Vertices that explain a label so much worse than the best one as `reach` says are left out, but not those of the
-    /// path. `None` when a sequence has more than `limit` walks.
+    /// Vertices that are less likely than the best one by more than `reach` are left out, except those of the path. `None` when a
+    /// sequence has more than `limit` walks.
     pub fn all_paths(&self, reach: f64, limit: usize) -> Option<AllPaths> {
-        let vertices = self.tallied();
-        let knows_degrees = vertices.iter().any(|vertex| !vertex.degrees.is_empty());
-        let ways: Vec<usize> = vertices.iter().map(|vertex| likely_ways(vertex, self.noise)).collect();
+        let vertices = self.observed_vertices();
+        let has_degrees = vertices.iter().any(|vertex| !vertex.degrees.is_empty());
+        let degrees: Vec<usize> = vertices.iter().map(|vertex| likely_degree(vertex, self.noise)).collect();
         let fit = |at: usize, vertex: usize| {
             let Vertex { labels, .. } = &vertices[vertex];
             let seen = self.observations[at];
@@ -220,8 +219,8 @@ impl Weighed<'_> {
             let shape = SHAPE + (n - 1.0) / 2.0;
             let scale = SHAPE * self.noise.deviation.powi(2) + scatter(labels) / 2.0;
             let off = seen.label - mean(labels);
-            let degree = seen.degree.filter(|_| knows_degrees);
-            degree.map_or(0.0, |seen| degree_probability(seen, ways[vertex], self.noise.wrong_degree).ln())
+            let degree = seen.degree.filter(|_| has_degrees);
+            degree.map_or(0.0, |seen| degree_probability(seen, degrees[vertex], self.noise.wrong_degree).ln())
                 - (scale.ln() - digamma(shape) + 1.0 / n) / 2.0
                 - off.powi(2) * shape / (2.0 * scale)
         };
@@ -239,24 +238,24 @@ impl Weighed<'_> {
             .collect();
         let ln_probability = |walk: &Path, first: usize| {
             let ln_fits = walk.iter().enumerate().map(|(at, &vertex)| fits[first + at][vertex]).sum::<f64>();
-            let ln_exits = walk[..walk.len() - 1].iter().map(|&vertex| (ways[vertex] as f64).ln()).sum::<f64>();
+            let ln_exits = walk[..walk.len() - 1].iter().map(|&vertex| (degrees[vertex] as f64).ln()).sum::<f64>();
             ln_fits - ln_exits - (vertices.len() as f64).ln() + self.ln_turns(walk, first)
         };
-        let mut result = AllPaths { surplus: 0.0, places: Vec::new() };
+        let mut result = AllPaths { bound: 0.0, belief: Vec::new() };
         for (first, length) in self.sequences() {
             let walks = walks(&vertices, length, limit)?;
             let ln_walks: Vec<f64> = walks.iter().map(|walk| ln_probability(walk, first)).collect();
             let ln_all = ln_sum(ln_walks.iter().copied());
-            result.surplus += ln_all - ln_probability(&self.path[first..first + length], first);
-            result.places = vec![0.0; vertices.len()];
+            result.bound += ln_all - ln_probability(&self.path[first..first + length], first);
+            result.belief = vec![0.0; vertices.len()];
             for (walk, ln_walk) in walks.iter().zip(ln_walks) {
-                result.places[walk[length - 1]] += (ln_walk - ln_all).exp();
+                result.belief[walk[length - 1]] += (ln_walk - ln_all).exp();
             }
         }
         Some(result)
     }
 
-    /// Where each sequence starts, and how many places it has.
+    /// The first observation of each sequence, and its length.
     pub fn sequences(&self) -> Vec<(usize, usize)> {
         let mut starts: Vec<usize> = (0..self.path.len()).filter(|&at| self.observations[at].starts_sequence).collect();
         starts.push(self.path.len());
@@ -264,17 +263,17 @@ impl Weighed<'_> {
     }
 }
 
-/// The number of ways that explains the exits of a vertex and the degrees seen there best.
-fn likely_ways(vertex: &Vertex, noise: Noise) -> usize {
+/// The degree of a vertex that maximises the terms of [`ln_exits`].
+fn likely_degree(vertex: &Vertex, noise: Noise) -> usize {
     let least = vertex.neighbours.len().max(1);
     if vertex.degrees.is_empty() {
         return least;
     }
-    let ln = |ways: usize| ln_exits_by(ways, vertex.exits, &vertex.degrees, noise);
-    (least..=least.max(MOST_WAYS)).rev().max_by(|&a, &b| ln(a).total_cmp(&ln(b))).unwrap_or(least)
+    let ln = |degree: usize| ln_exits_by(degree, vertex.exits, &vertex.degrees, noise);
+    (least..=least.max(MOST_EXITS)).rev().max_by(|&a, &b| ln(a).total_cmp(&ln(b))).unwrap_or(least)
 }
 
-/// Every walk of so many vertices; `None` when there are more than `limit`.
+/// Every walk of `length` vertices; `None` when there are more than `limit`.
 fn walks(vertices: &[Vertex], length: usize, limit: usize) -> Option<Vec<Vec<usize>>> {
     let mut walks: Vec<Vec<usize>> = (0..vertices.len()).map(|start| vec![start]).collect();
     for _ in 1..length {
@@ -304,7 +303,7 @@ fn ln_sum(logarithms: impl Iterator<Item = f64> + Clone) -> f64 {
     largest + logarithms.map(|ln| (ln - largest).exp()).sum::<f64>().ln()
 }
 
-/// ln Γ for positive numbers: Stirling's series behind Γ(x + 1) = x Γ(x).
+/// ln Γ for positive numbers: Γ(x + 1) = x Γ(x), then Stirling's series.
 pub fn ln_gamma(x: f64) -> f64 {
     if x < 16.0 {
         return ln_gamma(x + 1.0) - x.ln();
@@ -334,7 +333,7 @@ mod tests {
     }
 
     #[test]
-    fn the_gamma_function_is_that_of_the_tables() {
+    fn the_gamma_function_has_its_known_values() {
         assert!((ln_gamma(0.5) - std::f64::consts::PI.sqrt().ln()).abs() < 1e-11);
         assert!((ln_gamma(11.0) - 3_628_800_f64.ln()).abs() < 1e-11);
         assert!((digamma(1.0) + 0.577_215_664_901_532_9).abs() < 1e-11);
@@ -343,7 +342,7 @@ mod tests {
 
     /// The integral that the closed form stands for, over mean and logarithm of the variance, by the trapezoidal rule.
     #[test]
-    fn labels_have_the_density_of_the_integral_over_mean_and_variance() {
+    fn the_density_of_labels_is_the_integral_over_mean_and_variance() {
         let labels = [500.0, 512.0, 497.0];
         let (scale, points) = (SHAPE * 100.0, 400);
         let mut integral = 0.0;
@@ -364,18 +363,20 @@ mod tests {
     }
 
     #[test]
-    fn a_single_path_has_no_surplus_and_two_that_look_alike_share() {
+    fn a_single_path_has_bound_0_and_two_equal_paths_share_the_probability() {
         // From one end of a line to the other: the way back would fit as well if the labels were alike.
-        let weighed = |labels: &'static [f64]| {
+        let hypothesis = |labels: &'static [f64]| {
             let observations = seen(labels);
             let path: Vec<usize> = (0..labels.len()).collect();
-            Weighed { observations: &observations, path: &path, noise: NOISE }.all_paths(f64::INFINITY, 1000).unwrap()
+            Hypothesis { observations: &observations, path: &path, noise: NOISE }
+                .all_paths(f64::INFINITY, 1000)
+                .unwrap()
         };
-        let apart = weighed(&[100.0, 400.0, 700.0]);
-        assert!(apart.surplus.abs() < 1e-6 && apart.places[2] > 1.0 - 1e-6, "{apart:?}");
-        let alike = weighed(&[100.0, 400.0, 100.0]);
+        let apart = hypothesis(&[100.0, 400.0, 700.0]);
+        assert!(apart.bound.abs() < 1e-6 && apart.belief[2] > 1.0 - 1e-6, "{apart:?}");
+        let alike = hypothesis(&[100.0, 400.0, 100.0]);
         // 0-1-2 and 2-1-0, 0-1-0 and 2-1-2 are as likely.
-        assert!((alike.surplus - 4_f64.ln()).abs() < 1e-6, "{alike:?}");
-        assert!((alike.places[0] - 0.5).abs() < 1e-6);
+        assert!((alike.bound - 4_f64.ln()).abs() < 1e-6, "{alike:?}");
+        assert!((alike.belief[0] - 0.5).abs() < 1e-6);
     }
 }

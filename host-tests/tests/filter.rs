@@ -23,7 +23,7 @@ fn config(random: &mut Random, direction: Direction) -> PaperConfig {
         .with_direction(direction)
 }
 
-/// Drives both filters through so many buildings; they agree at every place, and ties are rare.
+/// Drives both filters through random buildings: they agree at every place, and ties are rare.
 fn agree(drives: u64, with_prior: bool) {
     let mut tally = Tally::default();
     for seed in 0..drives {
@@ -47,17 +47,17 @@ fn agree(drives: u64, with_prior: bool) {
 }
 
 #[test]
-fn the_filter_on_line_draws_what_the_reference_draws() {
+fn the_filter_on_line_draws_the_same_particles_as_the_reference() {
     agree(300, false);
 }
 
 #[test]
-fn the_filter_with_a_prior_draws_what_the_reference_draws() {
+fn the_filter_with_a_prior_draws_the_same_particles_as_the_reference() {
     agree(300, true);
 }
 
 #[test]
-fn maps_too_far_from_the_evidence_to_tell_apart_are_drawn_by_the_other_factors() {
+fn maps_at_saturated_distances_are_drawn_by_the_other_factors() {
     // Eq. 8 saturates at 64 σ_c, here at 64 to 256 mm: most maps are beyond.
     for seed in 0..150 {
         let mut random = Random(seed);
@@ -78,7 +78,7 @@ fn maps_too_far_from_the_evidence_to_tell_apart_are_drawn_by_the_other_factors()
 }
 
 #[test]
-fn an_empty_prior_leaves_the_choice_to_the_other_factors() {
+fn with_an_empty_prior_the_other_factors_decide() {
     for (seed, direction) in (0..).zip(DIRECTIONS.into_iter().cycle().take(30)) {
         let mut random = Random(seed);
         let config = PaperConfig::DEFAULT.with_ngram_length(3).with_direction(direction);
@@ -109,7 +109,7 @@ fn long_n_grams_with_coarse_labels_agree() {
 }
 
 #[test]
-fn a_drive_longer_than_the_history_agrees_and_counts_what_was_dropped() {
+fn a_drive_longer_than_the_history_agrees_and_counts_the_dropped_observations() {
     for (seed, direction) in (0..).zip(DIRECTIONS) {
         let mut random = Random(seed);
         let mut drive =
@@ -123,7 +123,7 @@ fn a_drive_longer_than_the_history_agrees_and_counts_what_was_dropped() {
 }
 
 #[test]
-fn a_map_without_room_for_a_new_vertex_is_reported_and_goes_on_with_what_it_has() {
+fn a_full_map_keeps_its_vertices_and_is_reported() {
     for (seed, direction) in (0..).zip(DIRECTIONS) {
         let mut random = Random(seed);
         let config = PaperConfig::DEFAULT
@@ -141,7 +141,7 @@ fn a_map_without_room_for_a_new_vertex_is_reported_and_goes_on_with_what_it_has(
 }
 
 #[test]
-fn a_map_of_one_vertex_pays_one_minus_phi_because_eq_9_includes_a_equal_b() {
+fn a_map_of_one_vertex_has_the_penalty_one_minus_phi_because_eq_9_includes_a_equal_b() {
     for penalty_permille in [0_u16, 1, 100, 500, 999] {
         let mut filter = PaperFilter::<1, 4, 1>::new();
         filter.start(PaperConfig::DEFAULT.with_penalty_permille(penalty_permille).with_particles(1), 0).unwrap();
@@ -152,8 +152,8 @@ fn a_map_of_one_vertex_pays_one_minus_phi_because_eq_9_includes_a_equal_b() {
     }
 }
 
-/// Everything a filter tells about a drive of 40 places.
-fn told(filter: &mut PaperFilter<10, 16, 4>, seed: u64) -> Vec<String> {
+/// All updates of a filter on a drive of 40 places.
+fn updates(filter: &mut PaperFilter<10, 16, 4>, seed: u64) -> Vec<String> {
     filter.start(PaperConfig::DEFAULT.with_ngram_length(4), seed).unwrap();
     let mut random = Random(7);
     let building = random.building(5);
@@ -167,8 +167,8 @@ fn told(filter: &mut PaperFilter<10, 16, 4>, seed: u64) -> Vec<String> {
 #[test]
 fn the_same_seed_gives_the_same_drive_and_another_seed_another() {
     let mut filter = Box::new(PaperFilter::new());
-    let first = told(&mut filter, 1);
-    assert_eq!(first, told(&mut filter, 1), "a filter that is started again forgets what it was");
-    assert_eq!(first, told(&mut Box::new(PaperFilter::new()), 1));
-    assert_ne!(first, told(&mut filter, 2));
+    let first = updates(&mut filter, 1);
+    assert_eq!(first, updates(&mut filter, 1), "a restarted filter has no state left");
+    assert_eq!(first, updates(&mut Box::new(PaperFilter::new()), 1));
+    assert_ne!(first, updates(&mut filter, 2));
 }

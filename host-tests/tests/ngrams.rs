@@ -21,7 +21,7 @@ proptest! {
     fn the_table_of_an_arbitrary_history_is_grams_h(history in history(25), n in 2_usize..=7) {
         let table = core_table_of_history(&history, n);
         let extracted = extracted(&history, n);
-        prop_assert_eq!(table.len(), extracted.len(), "no n-gram is held twice");
+        prop_assert_eq!(table.len(), extracted.len(), "no n-gram is in the table twice");
         prop_assert_eq!(ngrams_of(&table), extracted);
     }
 }
@@ -65,7 +65,7 @@ proptest! {
 }
 
 #[test]
-fn a_full_table_still_knows_the_n_grams_it_holds() {
+fn a_full_table_keeps_its_n_grams() {
     let ngram = |label: u16| Ngram::new(length(2), &[fingerprint(2.0 * f64::from(label)); 2]).unwrap();
     let mut table = NgramTable::<2>::new(length(2));
     for label in 0..32 {

@@ -63,7 +63,7 @@ fn exactly_one_map_of_six_vertices_is_3_consistent_with_the_history() {
     assert_eq!(distinct, BTreeSet::from([canonical(&Graph::with(&labels_mm(FIGURE_1B.0), &FIGURE_1B.1))]));
 }
 
-/// Every map of so many vertices that is 3-consistent with the history, up to the order of the vertices' labels.
+/// Every map of `vertices` vertices that is 3-consistent with the history, up to the order of the vertices' labels.
 ///
 /// An edge between two views that the history never shows in succession gives the 3-gram (x, y, x), which is not in
 /// Table I: no map with such an edge is consistent, and none is tried. Every other set of edges is, for every labelling.
@@ -95,7 +95,7 @@ fn consistent_maps(vertices: usize) -> Vec<Graph> {
     consistent
 }
 
-/// Every labelling of so many vertices with the five views, in ascending order of the views: the others only number the
+/// Every labelling of `vertices` vertices with the five views, in ascending order of the views: the others only number the
 /// vertices differently. From six vertices on only those that use all five views, because every view occurs in Table I
 /// and a map without it cannot have those n-grams.
 fn labellings(vertices: usize) -> Vec<Vec<f64>> {

@@ -1,7 +1,8 @@
 //! Estimates the rotation of the ring from frame to frame by the bearings of its obstacles: the robot has no odometry.
 
-use crate::bearing::{insert_ascending, rotated, turn_mrad};
+use crate::bearing::{rotated, turn_mrad};
 use crate::place::Obstacles;
+use crate::top_k::TopK;
 
 /// Bound of the rotation in one frame, and of the distance between the expected and the measured bearing of an obstacle, in
 /// milliradians.
@@ -32,20 +33,19 @@ impl RotationEstimate {
     ///
     /// Time O(1): at most six obstacles against six.
     pub(super) fn update(&mut self, obstacles: &Obstacles) {
-        // In ascending order; empty slots sort behind every residual.
-        let mut residuals_mrad = [i16::MAX; Obstacles::MAX];
-        let mut matched = 0_usize;
+        let mut residuals_mrad = TopK::<i16, { Obstacles::MAX }>::new(0);
         for &before_mrad in self.obstacles_mrad.iter().take(self.len.into()) {
             let expected_mrad = rotated(before_mrad, self.rotation_mrad());
             let all_mrad = obstacles.iter().map(|obstacle| turn_mrad(expected_mrad, obstacle.bearing_mrad));
             let nearest_mrad = all_mrad.min_by_key(|residual_mrad| residual_mrad.abs());
             let nearest_mrad = nearest_mrad.filter(|residual_mrad| residual_mrad.abs() < MAX_ROTATION_MRAD.into());
             if let Some(residual_mrad) = nearest_mrad {
-                insert_ascending(&mut residuals_mrad, residual_mrad as i16);
-                matched += 1;
+                residuals_mrad.insert(residual_mrad as i16, |one, other| one <= other);
             }
         }
-        let median_mrad = matched.checked_sub(1).and_then(|last| residuals_mrad.get(last / 2)).copied().unwrap_or(0);
+        let sorted_mrad = residuals_mrad.as_slice();
+        let last = sorted_mrad.len().saturating_sub(1);
+        let median_mrad = sorted_mrad.get(last / 2).copied().unwrap_or(0);
         self.rotation_mrad =
             self.rotation_mrad.saturating_add(median_mrad).clamp(-MAX_ROTATION_MRAD, MAX_ROTATION_MRAD);
         self.len = 0;

@@ -1,4 +1,4 @@
-//! Topological SLAM from a sequence of places: the filters, and what an observation tells of their best map.
+//! Topological SLAM from a sequence of places: the interface of a filter, the robust filter, and the paper's filter.
 
 mod interface;
 mod observation;
@@ -17,18 +17,18 @@ use crate::VertexId;
 use rand_core::SeedableRng;
 use rand_xoshiro::Xoshiro128PlusPlus;
 
-/// The random draws of one piece of work: a function of the seed and the number of the piece alone, so that a filter that is
-/// restored goes on as it would have.
+/// The random draws of one step of work: a function of the seed and the number of the step alone, so that a restored filter
+/// continues with the same draws.
 pub(crate) fn draws(seed: u64, number: u64) -> Xoshiro128PlusPlus {
     Xoshiro128PlusPlus::seed_from_u64(seed.wrapping_add(number.wrapping_mul(0x9E37_79B9_7F4A_7C15)))
 }
 
-/// What one observation did to the best hypothesis.
+/// The best hypothesis after an observation.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Update {
     /// How many places were observed before this one.
     pub place_index: u32,
-    /// The vertex the robot is at (Section III.B).
+    /// The vertex of the robot (Section III.B).
     pub vertex: VertexId,
     /// Whether the vertex was added by this observation.
     pub is_new: bool,
@@ -45,7 +45,7 @@ pub struct Update {
 }
 
 impl Update {
-    /// What a filter tells that was never started.
+    /// The update of a filter that was not started.
     pub(crate) const NONE: Self = Self {
         place_index: 0,
         vertex: VertexId::FIRST,

@@ -4,8 +4,7 @@ use core::fmt;
 
 /// A vertex of a map by its number, 0 to 63. Vertices are numbered in the order in which they were added.
 ///
-/// An id says nothing about the size of a map: whether a map has the vertex, the map tells
-/// ([`Map::label`](crate::Map::label) and others return `None`).
+/// An id is independent of the size of a map. [`Map::contains`](crate::Map::contains) checks whether a map has the vertex.
 ///
 /// ```
 /// use toposlam::VertexId;
@@ -18,7 +17,7 @@ use core::fmt;
 pub struct VertexId(u8);
 
 impl VertexId {
-    /// How many vertices there can be at most.
+    /// The largest number of vertices of a map.
     pub const LIMIT: usize = 64;
 
     /// Vertex 0.
@@ -39,7 +38,7 @@ impl VertexId {
         (0..count.min(Self::LIMIT) as u8).map(Self)
     }
 
-    /// The number of a bit.
+    /// The vertex with the number of a bit.
     pub(super) const fn of_bit(number: u32) -> Self {
         Self(number as u8)
     }

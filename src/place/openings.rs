@@ -2,7 +2,8 @@
 
 use super::scan::{Obstacles, RingScan};
 use super::smoothing::DEAD_MM;
-use crate::bearing::{HALF_TURN_MRAD, counter_clockwise_mrad, insert_ascending, rotated, turn_mrad};
+use crate::bearing::{HALF_TURN_MRAD, counter_clockwise_mrad, rotated, turn_mrad};
+use crate::top_k::TopK;
 
 /// A sensor looks into an opening when its range is above this percentage of the radius. The corner of a square room is at
 /// 1.41 times the radius of the inscribed disc.
@@ -11,14 +12,13 @@ const OPEN_PERCENT: u32 = 160;
 /// Bearings of the openings between the equidistant obstacles of a scan, at most [`Obstacles::MAX`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Openings {
-    bearings_mrad: [i16; Obstacles::MAX],
-    len: usize,
+    bearings_mrad: TopK<i16, { Obstacles::MAX }>,
 }
 
 impl Openings {
     /// Bearings in milliradians in ascending order: counter-clockwise from straight behind.
     pub fn bearings_mrad(&self) -> &[i16] {
-        self.bearings_mrad.get(..self.len).unwrap_or(&self.bearings_mrad)
+        self.bearings_mrad.as_slice()
     }
 
     /// Index and bearing of the opening closest to `bearing_mrad`; `None` when none is within `within_mrad` of it.
@@ -37,8 +37,7 @@ impl<const SONARS: usize> RingScan<'_, SONARS> {
     /// equidistant obstacles, or silence. The bearing of the opening is the mean of these sensors' bearings. A corridor
     /// that ends within 1.6 times that range is not an opening. Time `O(SONARS)` for each obstacle.
     pub fn openings(&self, obstacles: &Obstacles) -> Openings {
-        // Empty slots sort behind every bearing.
-        let mut openings = Openings { bearings_mrad: [i16::MAX; Obstacles::MAX], len: 0 };
+        let mut bearings_mrad = TopK::new(0);
         let radius_mm = obstacles.radius_mm();
         let bearings = obstacles.equidistant().map(|obstacle| obstacle.bearing_mrad);
         for from_mrad in bearings.clone() {
@@ -55,11 +54,10 @@ impl<const SONARS: usize> RingScan<'_, SONARS> {
             let (count, sum_mrad) =
                 open.fold((0i32, 0i32), |(count, sum), within_mrad| (count + 1, sum.saturating_add(within_mrad)));
             if let Some(middle_mrad) = sum_mrad.checked_div(count) {
-                insert_ascending(&mut openings.bearings_mrad, rotated(from_mrad, middle_mrad));
-                openings.len += 1;
+                bearings_mrad.insert(rotated(from_mrad, middle_mrad), |one, other| one <= other);
             }
         }
-        openings
+        Openings { bearings_mrad }
     }
 }
 

@@ -7,20 +7,20 @@ use toposlam::{
 use toposlam_host_tests::consistency::hausdorff;
 use toposlam_host_tests::graph::Graph;
 use toposlam_host_tests::ngram::{Ngram, NgramSet, grams_of_graph};
-use toposlam_host_tests::robust::{self, Noise, SURPLUS_SHARE, Weighed, mean};
+use toposlam_host_tests::robust::{self, Hypothesis, Noise, OTHER_PATHS_SHARE, mean};
 
 /// Tolerance of the core's evidence, in nats and relative to its magnitude: sums of f32 over some dozen places.
 pub const EVIDENCE_TOLERANCE: (f64, f64) = (5e-3, 2e-5);
-/// By how much its surplus may be off, in nats.
-pub const SURPLUS_TOLERANCE: f64 = 5e-3;
+/// Tolerance of the bound of the other paths, in nats.
+pub const BOUND_TOLERANCE: f64 = 5e-3;
 /// Tolerance of a probability, and of a sum of several.
 pub const PROBABILITY_TOLERANCE: f64 = 1e-3;
-/// The core considers at least those vertices for a place that explain it not so many nats worse than the best one.
+/// The core considers all vertices of a place whose log likelihood is less than this below the best one.
 pub const REACH: f64 = 15.0;
 /// Sequences with more walks through the map than this are not enumerated.
 const MOST_WALKS: usize = 2_000;
-/// Tolerance of the probability of a place.
-const PLACE_TOLERANCE: f64 = 5e-3;
+/// Tolerance of the probability of a vertex.
+const BELIEF_TOLERANCE: f64 = 5e-3;
 /// The number 1 in the unit of probabilities.
 const ONE: f64 = 65536.0;
 
@@ -29,33 +29,33 @@ pub struct Watched<const N: usize, const V: usize, const HISTORY: usize> {
     /// The filter.
     pub filter: Box<RobustFilter<N, V, HISTORY>>,
     config: RobustConfig,
-    /// What the record holds, the oldest first.
+    /// The history, the oldest observation first.
     observations: Vec<Observation>,
     /// The path after the newest place.
     path: Vec<usize>,
     vertices: usize,
-    /// Whether an observation left the record: then counts and evidence hold more than the record shows.
+    /// Whether an observation was marginalised: statistics and evidence then include more than the history.
     pub has_dropped: bool,
-    /// What was counted.
-    pub tally: Tally,
+    /// The counts.
+    pub counts: Counts,
 }
 
 /// How often each comparison was made, and how often it failed in a way that may be rare.
 #[derive(Clone, Copy, Debug, Default)]
-pub struct Tally {
-    /// Surplus and places were compared.
+pub struct Counts {
+    /// Bound and belief were compared.
     pub compared: u32,
-    /// What the core leaves out of the paths makes a difference.
+    /// The paths that the core leaves out make a difference.
     pub pruned: u32,
-    /// Surplus or distribution of the place were not those of the best hypothesis.
+    /// Bound or belief were not those of the best hypothesis.
     pub stale: u32,
     /// The worst n-gram was searched.
     pub searched: u32,
-    /// The core found an n-gram that is not the worst: it considers sixteen.
+    /// The core found an n-gram that is not the worst: it evaluates a limited number.
     pub overlooked: u32,
 }
 
-impl std::ops::AddAssign for Tally {
+impl std::ops::AddAssign for Counts {
     fn add_assign(&mut self, more: Self) {
         self.compared += more.compared;
         self.pruned += more.pruned;
@@ -78,7 +78,7 @@ impl<const N: usize, const V: usize, const HISTORY: usize> Watched<N, V, HISTORY
             path: Vec::new(),
             vertices: 0,
             has_dropped: false,
-            tally: Tally::default(),
+            counts: Counts::default(),
         }
     }
 
@@ -100,7 +100,7 @@ impl<const N: usize, const V: usize, const HISTORY: usize> Watched<N, V, HISTORY
         assert_eq!(path.last(), Some(&usize::from(update.vertex)), "the robot is where the path ends");
         assert!(update.distinct >= 1 && update.distinct <= self.config.hypotheses, "{update:?}");
         self.check_probabilities();
-        self.check_names(&path);
+        self.check_ids(&path);
         self.check_worst(update);
         let evidence = f64::from(self.filter.evidence().0);
         let factors = f64::from(update.factors.ln_weight_q16()) / ONE;
@@ -133,9 +133,9 @@ impl<const N: usize, const V: usize, const HISTORY: usize> Watched<N, V, HISTORY
     }
 
     fn check_probabilities(&mut self) {
-        let of_place = |vertex| f64::from(self.filter.vertex_probability_q16(vertex)) / ONE;
-        let sum: f64 = self.filter.map().vertices().map(of_place).sum();
-        self.tally.stale += u32::from((sum - 1.0).abs() >= PROBABILITY_TOLERANCE);
+        let of_vertex = |vertex| f64::from(self.filter.vertex_probability_q16(vertex)) / ONE;
+        let sum: f64 = self.filter.map().vertices().map(of_vertex).sum();
+        self.counts.stale += u32::from((sum - 1.0).abs() >= PROBABILITY_TOLERANCE);
         assert!(self.filter.map_probability_q16() <= ONE as u32);
         assert!(self.filter.map_probability_q16() > 0);
     }
@@ -143,12 +143,12 @@ impl<const N: usize, const V: usize, const HISTORY: usize> Watched<N, V, HISTORY
     /// Asserts that the map follows from the path.
     fn check_map(&self, path: &[usize], update: &Update) {
         let observations = self.seen();
-        let weighed = Weighed { observations: &observations, path, noise: self.noise() };
+        let hypothesis = Hypothesis { observations: &observations, path, noise: self.noise() };
         let map = self.filter.map();
-        assert_eq!(map.vertices().len(), weighed.vertices());
+        assert_eq!(map.vertices().len(), hypothesis.vertices());
         let edges: Vec<_> = map.edges().map(|(a, b)| (usize::from(a), usize::from(b))).collect();
-        assert!(weighed.edges().into_iter().eq(edges), "the edges are those that were driven");
-        for (vertex, labels) in map.vertices().zip(weighed.labels()) {
+        assert!(hypothesis.edges().into_iter().eq(edges), "the edges are those that were driven");
+        for (vertex, labels) in map.vertices().zip(hypothesis.labels()) {
             let label = map.label(vertex).map_or(f64::NAN, |label| f64::from(label.steps()));
             assert!((label - mean(&labels)).abs() < 0.501, "a label is the rounded mean: {label} {labels:?}");
             assert_eq!(map.visits(vertex) as usize, labels.len());
@@ -158,40 +158,40 @@ impl<const N: usize, const V: usize, const HISTORY: usize> Watched<N, V, HISTORY
 
     fn check_evidence(&mut self, path: &[usize]) {
         let observations = self.seen();
-        let weighed = Weighed { observations: &observations, path, noise: self.noise() };
-        let (evidence, surplus) = self.filter.evidence();
-        let expected = weighed.evidence();
+        let hypothesis = Hypothesis { observations: &observations, path, noise: self.noise() };
+        let (evidence, bound) = self.filter.evidence();
+        let expected = hypothesis.evidence();
         assert!(near(f64::from(evidence), expected), "evidence {evidence} {expected} {path:?}");
-        let of = |reach: f64| weighed.all_paths(reach, MOST_WALKS);
+        let of = |reach: f64| hypothesis.all_paths(reach, MOST_WALKS);
         let (Some(least), Some(most)) = (of(REACH), of(f64::INFINITY)) else { return };
-        let surplus = f64::from(surplus);
-        let [low, high] = [least.surplus, most.surplus].map(|surplus| surplus * SURPLUS_SHARE);
-        self.tally.compared += 1;
-        if surplus <= low - SURPLUS_TOLERANCE || surplus >= high + SURPLUS_TOLERANCE {
-            self.tally.stale += 1;
+        let bound = f64::from(bound);
+        let [low, high] = [least.bound, most.bound].map(|bound| bound * OTHER_PATHS_SHARE);
+        self.counts.compared += 1;
+        if bound <= low - BOUND_TOLERANCE || bound >= high + BOUND_TOLERANCE {
+            self.counts.stale += 1;
             return;
         }
-        if high - low > SURPLUS_TOLERANCE {
-            self.tally.pruned += 1;
+        if high - low > BOUND_TOLERANCE {
+            self.counts.pruned += 1;
             return;
         }
-        let of_place = |vertex: usize| f64::from(self.filter.vertex_probability_q16(super::vertex(vertex))) / ONE;
-        let is_right = |(vertex, place): (usize, &f64)| (of_place(vertex) - place).abs() < PLACE_TOLERANCE;
-        self.tally.stale += u32::from(!most.places.iter().enumerate().all(is_right));
+        let of_vertex = |vertex: usize| f64::from(self.filter.vertex_probability_q16(super::vertex(vertex))) / ONE;
+        let is_right = |(vertex, place): (usize, &f64)| (of_vertex(vertex) - place).abs() < BELIEF_TOLERANCE;
+        self.counts.stale += u32::from(!most.belief.iter().enumerate().all(is_right));
     }
 
     /// Asserts that a vertex keeps its id as long as its visits stay together.
-    fn check_names(&self, path: &[usize]) {
+    fn check_ids(&self, path: &[usize]) {
         let vertices = self.filter.map().vertices().len();
         let shared = || self.path.iter().copied().zip(path.iter().copied());
         for before in 0..V {
-            let renamed = self.filter.remapped(super::vertex(before)).map(usize::from);
-            assert!(renamed.is_none_or(|now| now < vertices), "{before} is now {renamed:?} of {vertices}");
-            assert!(renamed.is_none() || before < self.vertices, "{before} was not there: {renamed:?}");
+            let remapped = self.filter.remapped(super::vertex(before)).map(usize::from);
+            assert!(remapped.is_none_or(|now| now < vertices), "{before} is now {remapped:?} of {vertices}");
+            assert!(remapped.is_none() || before < self.vertices, "{before} was not there: {remapped:?}");
             let mut now: Vec<usize> = shared().filter(|&(was, _)| was == before).map(|(_, now)| now).collect();
             now.dedup();
             let &[now] = now.as_slice() else { continue };
-            assert_eq!(renamed, Some(now), "all visits of {before} went there");
+            assert_eq!(remapped, Some(now), "all visits of {before} went there");
             let kept_together = shared().all(|(was, is)| is != now || was == before);
             if kept_together && before < vertices {
                 assert_eq!(now, before, "its visits stayed together: {:?} {path:?}", self.path);
@@ -223,8 +223,8 @@ impl<const N: usize, const V: usize, const HISTORY: usize> Watched<N, V, HISTORY
         let distance_mm = hausdorff(&grams_of_graph(&graph, N_GRAM), &history).history_to_map;
         let found_mm = f64::from(worst.distance_mm);
         assert!(found_mm <= distance_mm.min(f64::from(u16::MAX)), "Eq. 2: {found_mm} {distance_mm}");
-        self.tally.searched += 1;
-        self.tally.overlooked += u32::from(found_mm < distance_mm);
+        self.counts.searched += 1;
+        self.counts.overlooked += u32::from(found_mm < distance_mm);
         if ends.is_empty() {
             assert_eq!(worst.length, 0);
             return;

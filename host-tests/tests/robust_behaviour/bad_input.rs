@@ -11,7 +11,7 @@ fn seen(radius_mm: u16) -> Observation {
 }
 
 #[test]
-fn without_room_for_a_vertex_the_map_goes_on_with_those_it_has() {
+fn a_full_map_keeps_its_vertices_and_reports_the_fault() {
     let environment = six_rooms();
     let mut robot = Robot::new(&environment, Hints::default(), 1);
     let mut filter = started::<10, 4, 64>(1);
@@ -23,23 +23,23 @@ fn without_room_for_a_vertex_the_map_goes_on_with_those_it_has() {
 }
 
 #[test]
-fn degrees_that_no_place_has_are_as_good_as_none_or_seven() {
+fn degree_0_counts_as_unknown_and_large_degrees_as_7() {
     let environment = easy();
     let [none, seven] = [(None, Some(0)), (Some(7), Some(200))].map(|(plain, odd)| {
-        let told = [plain, odd].map(|degree| {
+        let results = [plain, odd].map(|degree| {
             let mut robot = Robot::new(&environment, Hints::default(), 2);
             let mut filter = started::<10, 8, 64>(2);
             let mut observe = |_| filter.observe(Observation { degree, ..robot.step() });
             let updates: Vec<_> = (0..60).map(&mut observe).collect();
             (updates, filter.evidence(), filter.path().collect::<Vec<_>>())
         });
-        told[0] == told[1]
+        results[0] == results[1]
     });
     assert!(none && seven);
 }
 
 #[test]
-fn turns_at_the_first_two_places_of_a_sequence_mean_nothing() {
+fn turn_hints_at_the_first_two_places_of_a_sequence_are_ignored() {
     let paths = [None, Some(Turn::Back), Some(Turn::On)].map(|turn| {
         let environment = easy();
         let mut robot = Robot::new(&environment, Hints::default(), 3);
@@ -55,7 +55,7 @@ fn turns_at_the_first_two_places_of_a_sequence_mean_nothing() {
 }
 
 #[test]
-fn a_robot_to_which_every_place_looks_alike_is_told_something_consistent() {
+fn places_that_all_look_alike_give_a_consistent_map() {
     for (name, radii_mm) in [
         ("all alike", vec![1200]),
         ("two in turn", vec![1200, 2000]),
@@ -74,7 +74,7 @@ fn a_robot_to_which_every_place_looks_alike_is_told_something_consistent() {
 }
 
 #[test]
-fn a_robot_that_is_carried_to_every_place_has_a_map_without_edges() {
+fn a_robot_that_is_kidnapped_before_every_place_has_a_map_without_edges() {
     let mut watched = Watched::<10, 6, 64>::new(RobustConfig::DEFAULT, 1);
     for radius_mm in [900, 1300, 1700].into_iter().cycle().take(45) {
         watched.observe(Observation { starts_sequence: true, ..seen(radius_mm) });
@@ -116,7 +116,7 @@ fn bears<const N: usize, const V: usize>(config: RobustConfig, observations: &[(
         watched.observe(*observation);
         (0..*refine).for_each(|_| watched.filter.refine());
     }
-    // In the middle of it all the filter is told to keep its map.
+    // In between, the filter localises only.
     watched.filter.set_localise_only(true);
     for (observation, _) in observations.iter().take(12) {
         watched.filter.observe(*observation);

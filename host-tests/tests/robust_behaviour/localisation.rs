@@ -1,8 +1,8 @@
-//! A robot with a map finds where it is.
+//! Localisation with a known map.
 
 use super::*;
 
-/// The map of an environment, every place seen so often.
+/// The map of an environment, with this many visits of every place.
 fn known<const V: usize>(environment: &Environment, visits: u32) -> Map<V> {
     let mut map = Map::new();
     for place in environment.places() {
@@ -34,13 +34,13 @@ fn look_around(filter: &mut Localiser, robot: &mut Robot) {
     }
 }
 
-/// The vertex whose number is that of its place.
+/// Whether the filter is certain of the robot's place, whose number is that of the vertex.
 fn is_found(filter: &Localiser, robot: &Robot) -> bool {
     let place = vertex(*robot.walk.last().unwrap());
     f64::from(filter.vertex_probability_q16(place)) > 0.9 * 65536.0 && filter.path().last() == Some(place)
 }
 
-/// After how many places the robot knows where it is, and is right.
+/// The number of places until the robot is localised.
 fn places_until_found(filter: &mut Localiser, robot: &mut Robot) -> usize {
     (1..=40)
         .find(|_| {
@@ -58,7 +58,7 @@ fn summary(name: &str, places: &[usize]) -> (f64, usize) {
 }
 
 #[test]
-fn a_robot_with_a_map_finds_itself_within_a_few_places() {
+fn a_robot_with_a_map_is_localised_within_a_few_places() {
     for (name, environment, most_mean) in [("six rooms", six_rooms(), 4.0), ("floor", floor(), 6.0)] {
         for (hints, with) in [(Hints::default(), "no hints"), (TURNS, "turns")] {
             let find = |seed| {
@@ -77,37 +77,39 @@ fn a_robot_with_a_map_finds_itself_within_a_few_places() {
     }
 }
 
-/// For each of 60 robots, after how many places it is found that was carried off.
-fn carried_off(environment: &Environment, is_told: bool) -> Vec<usize> {
+/// For each of 60 kidnapped robots the number of places until it is localised.
+fn places_after_kidnapping(environment: &Environment, is_reported: bool) -> Vec<usize> {
     let kidnap = |seed| {
         let mut robot = Robot::new(environment, Hints::default(), seed);
         let mut filter = localiser(environment, seed);
         look_around(&mut filter, &mut robot);
-        robot.carry_off(is_told);
+        robot.carry_off(is_reported);
         places_until_found(&mut filter, &mut robot)
     };
     (0..60).map(kidnap).collect()
 }
 
 #[test]
-fn a_robot_that_says_it_was_carried_off_finds_itself_within_a_few_places() {
+fn a_robot_that_reports_a_kidnapping_is_localised_within_a_few_places() {
     for (name, environment) in [("six rooms", six_rooms()), ("floor", floor())] {
-        let (mean, most) = summary(&format!("{name}, carried off, told"), &carried_off(&environment, true));
+        let (mean, most) =
+            summary(&format!("{name}, kidnapping reported"), &places_after_kidnapping(&environment, true));
         assert!(mean <= 4.0 && most <= 15);
     }
 }
 
 #[test]
-fn a_robot_that_was_carried_off_unawares_finds_itself_again() {
+fn a_kidnapped_robot_that_does_not_know_it_is_localised_again() {
     for (name, environment, most_mean) in [("six rooms", six_rooms(), 5.0), ("floor", floor(), 15.0)] {
-        let places: Vec<usize> = carried_off(&environment, false).into_iter().map(|places| places.min(40)).collect();
-        let (mean, _) = summary(&format!("{name}, carried off, not told"), &places);
+        let places: Vec<usize> =
+            places_after_kidnapping(&environment, false).into_iter().map(|places| places.min(40)).collect();
+        let (mean, _) = summary(&format!("{name}, kidnapping not reported"), &places);
         assert!(mean <= most_mean);
     }
 }
 
 #[test]
-fn a_carriage_that_is_noticed_late_leaves_no_edge_on_the_map() {
+fn a_kidnapping_that_is_detected_late_adds_no_edge() {
     let environment = six_rooms();
     let is_exact = |&seed: &u64| {
         let mut robot = Robot::new(&environment, Hints::default(), seed);
@@ -125,7 +127,7 @@ fn a_carriage_that_is_noticed_late_leaves_no_edge_on_the_map() {
 }
 
 #[test]
-fn a_robot_that_stops_localising_maps_on() {
+fn mapping_continues_after_localisation_alone() {
     let environment = six_rooms();
     for seed in 0..5 {
         let mut robot = Robot::new(&environment, Hints::default(), seed);
@@ -149,7 +151,7 @@ fn a_robot_that_stops_localising_maps_on() {
 }
 
 #[test]
-fn a_map_that_is_kept_as_it_is_has_no_room_for_what_is_new() {
+fn localisation_alone_adds_no_vertex() {
     let environment = six_rooms();
     let mut filter = localiser(&environment, 1);
     let before = *filter.map();
@@ -162,10 +164,10 @@ fn a_map_that_is_kept_as_it_is_has_no_room_for_what_is_new() {
 }
 
 #[test]
-fn a_map_that_is_kept_stays_when_the_counts_of_its_vertices_fade() {
+fn localisation_alone_keeps_the_map_when_its_statistics_decay() {
     let environment = six_rooms();
     let mut robot = Robot::new(&environment, Hints::default(), 1);
-    // So many visits that they fade with the first place that leaves the history.
+    // The visits are so many that they decay with the first marginalised place.
     let mut filter = localiser_with(&known(&environment, 600), 1);
     filter.observe(robot.step());
     let before = *filter.map();
@@ -177,7 +179,7 @@ fn a_map_that_is_kept_stays_when_the_counts_of_its_vertices_fade() {
 }
 
 #[test]
-fn a_robot_that_localises_before_it_has_a_map_begins_to_map_when_it_may() {
+fn localisation_without_a_map_loses_the_places_and_mapping_starts_afterwards() {
     let environment = six_rooms();
     let mut robot = Robot::new(&environment, Hints::default(), 1);
     let mut filter = Localiser::new(RobustFilter::new());

@@ -25,7 +25,7 @@ fn ten_thousand_places<const HISTORY: usize>(environment: &Environment, hints: H
     assert_eq!(filter.observed(), PLACES as u32);
     assert_eq!(filter.faults().count(FaultKind::HistoryFull), (PLACES - HISTORY) as u32);
     assert_eq!(filter.faults().count(FaultKind::VerticesFull), 0);
-    // What left the record fades beyond 512 visits a vertex; what is in it comes on top.
+    // Marginalised visits decay at 512 of a vertex; those of the history are added.
     assert!(visits.iter().all(|&visits| (10..=512 + HISTORY as u32).contains(&visits)), "{visits:?}");
     assert!(filter.evidence().0.is_finite());
     assert!(filter.noise_mm() < 60.0, "{}", filter.noise_mm());

@@ -1,4 +1,4 @@
-//! What the robust filter does: it recovers, goes on for ever, finds itself, and bears bad input.
+//! The behaviour of the robust filter: wrong hints and noise, recovery, long runs, localisation, and invalid input.
 
 mod bad_input;
 #[path = "../common/mod.rs"]
@@ -15,7 +15,7 @@ use toposlam::{FaultKind, Filter, Fingerprint, Map, Observation, RobustConfig, R
 use toposlam_eval::environment::Environment;
 use toposlam_eval::walk::all_walks;
 
-/// Moves in the time between two places.
+/// Refinement steps between two places.
 const REFINEMENTS: usize = 4;
 
 fn started<const N: usize, const V: usize, const HISTORY: usize>(seed: u64) -> Box<RobustFilter<N, V, HISTORY>> {
@@ -35,20 +35,20 @@ fn drive<const N: usize, const V: usize, const HISTORY: usize>(
     }
 }
 
-/// Drives until the map is exact, and tells after how many places that was; `None` when it did not happen in so many.
+/// Drives until the map is exact, and returns the number of places; `None` if it is not exact after `most` places.
 fn until_exact<const N: usize, const V: usize, const HISTORY: usize>(
     filter: &mut RobustFilter<N, V, HISTORY>,
     robot: &mut Robot,
-    (most, refine): (usize, usize),
+    (most, refinements): (usize, usize),
 ) -> Option<usize> {
     (1..=most).find(|_| {
         filter.observe(robot.step());
-        (0..refine).for_each(|_| filter.refine());
+        (0..refinements).for_each(|_| filter.refine());
         robot.is_mapped_by(filter)
     })
 }
 
-/// In how many of ten drives the map is exact after so many places.
+/// The number of drives of ten whose map is exact after `places` places.
 fn exact_of_ten(environment: &Environment, hints: Hints, config: RobustConfig, places: usize) -> usize {
     let is_exact = |&seed: &u64| {
         let mut robot = Robot::new(environment, hints, 100 + seed);
@@ -64,7 +64,7 @@ fn exact_of_ten(environment: &Environment, hints: Hints, config: RobustConfig, p
 }
 
 #[test]
-fn turn_hints_that_are_wrong_or_missing_do_not_cost_the_map() {
+fn wrong_and_missing_turn_hints_do_not_prevent_the_exact_map() {
     let hints = Hints { missing_percent: 30, wrong_percent: 5, ..TURNS };
     for (name, environment, places) in [("six rooms", six_rooms(), 200), ("ring", ring_with_a_repeated_part(), 300)] {
         let exact = exact_of_ten(&environment, hints, RobustConfig::DEFAULT, places);
@@ -74,7 +74,7 @@ fn turn_hints_that_are_wrong_or_missing_do_not_cost_the_map() {
 }
 
 #[test]
-fn a_first_guess_at_the_noise_that_is_off_by_a_factor_of_two_gives_the_same_map() {
+fn a_configured_noise_that_is_off_by_a_factor_of_two_gives_the_same_map() {
     // The places of this environment have a standard deviation of 20 mm.
     for noise_mm in [10, 20, 40] {
         let config = RobustConfig::DEFAULT.with_noise_mm(noise_mm);
@@ -87,23 +87,23 @@ fn a_first_guess_at_the_noise_that_is_off_by_a_factor_of_two_gives_the_same_map(
 #[test]
 fn the_same_seed_and_input_give_the_same_result() {
     let environment = floor();
-    let told = |seed: u64, refine: usize| -> Vec<String> {
+    let results = |seed: u64, refinements: usize| -> Vec<String> {
         let mut robot = Robot::new(&environment, TURNS, 9);
         let mut filter = started::<10, 16, 64>(seed);
         let mut observe = |_| {
             let update = filter.observe(robot.step());
-            (0..refine).for_each(|_| filter.refine());
+            (0..refinements).for_each(|_| filter.refine());
             format!("{update:?} {:?} {:?} {:?}", filter.map(), filter.worst(), filter.evidence())
         };
         (0..100).map(&mut observe).collect()
     };
-    assert_eq!(told(1, 2), told(1, 2));
-    assert_eq!(told(1, 0), told(1, 0));
-    assert_ne!(told(1, 2), told(2, 2), "the moves are drawn");
+    assert_eq!(results(1, 2), results(1, 2));
+    assert_eq!(results(1, 0), results(1, 0));
+    assert_ne!(results(1, 2), results(2, 2), "the proposals are drawn");
 }
 
 #[test]
-fn n_grams_of_an_exploration_give_the_map_before_the_path_could() {
+fn the_n_grams_of_an_exploration_give_the_exact_map_earlier() {
     let environment = six_rooms();
     let walks = all_walks(&environment, 5, 1000).unwrap();
     let checks = [10, 25];

@@ -1,4 +1,4 @@
-//! A map that went wrong becomes right again.
+//! Recovery from a wrong map.
 
 use super::*;
 
@@ -19,7 +19,7 @@ fn mapped(robot: &mut Robot, seed: u64) -> Mapped {
     (filter, path)
 }
 
-/// Forces a mistake and tells how many places it took to have the exact map again, for each seed.
+/// Forces a mistake and returns, for each seed, the number of places until the map is exact again.
 fn places_until_right_again(
     environment: &Environment,
     hints: Hints,
@@ -56,7 +56,7 @@ fn is_soon(places: &[usize], within: usize) {
 }
 
 #[test]
-fn a_place_that_was_split_in_two_is_one_again_within_10_places() {
+fn a_split_place_is_merged_within_10_places() {
     let split = |robot: &Robot, path: &[u8]| {
         let mut visits = 0;
         let vertex = vertex_of(robot, path, 1);
@@ -71,7 +71,7 @@ fn a_place_that_was_split_in_two_is_one_again_within_10_places() {
 }
 
 #[test]
-fn two_look_alike_places_that_were_merged_are_two_again_within_20_places() {
+fn two_merged_places_that_look_alike_are_split_within_20_places() {
     let merge = |robot: &Robot, path: &[u8]| {
         let [kept, gone] = [0, 3].map(|place| vertex_of(robot, path, place));
         closed(path.iter().map(|&at| if at == gone { kept } else { at }).collect())
@@ -80,7 +80,7 @@ fn two_look_alike_places_that_were_merged_are_two_again_within_20_places() {
 }
 
 #[test]
-fn a_part_that_was_folded_onto_a_look_alike_one_unfolds_within_50_places() {
+fn a_part_that_was_folded_onto_another_is_unfolded_within_50_places() {
     let fold = |robot: &Robot, path: &[u8]| {
         let pairs =
             [(0, 4), (1, 5), (2, 6)].map(|(kept, gone)| [kept, gone].map(|place| vertex_of(robot, path, place)));

@@ -92,7 +92,7 @@ impl Line {
 
 /// A delay that transmits meanwhile.
 pub(crate) struct SendingDelay<'a> {
-    cycles_per_refinement: u32,
+    cycles_per_slice: u32,
     line: &'a RefCell<Line>,
 }
 
@@ -102,7 +102,7 @@ impl<'a> SendingDelay<'a> {
     const SLICE_NS: u32 = 1_000_000_000 / Self::SLICES_PER_SECOND;
 
     pub(crate) const fn new(clock_hz: u32, line: &'a RefCell<Line>) -> Self {
-        Self { cycles_per_refinement: clock_hz / Self::SLICES_PER_SECOND, line }
+        Self { cycles_per_slice: clock_hz / Self::SLICES_PER_SECOND, line }
     }
 
     fn pump(&self) {
@@ -116,7 +116,7 @@ impl DelayNs for SendingDelay<'_> {
     fn delay_ns(&mut self, nanoseconds: u32) {
         for _ in 0..nanoseconds.div_ceil(Self::SLICE_NS) {
             self.pump();
-            asm::delay(self.cycles_per_refinement);
+            asm::delay(self.cycles_per_slice);
         }
         self.pump();
     }

@@ -11,14 +11,14 @@ pub struct PaperConfig {
     pub ngram_length: u8,
     /// `N`: how many particles represent the posterior, 1 to the filter's capacity. Default 10 (Section IV).
     pub particles: u8,
-    /// φ of Eq. 9 in thousandths, 0 to 999: the price of vertices that look alike. Default 100 (Section IV).
+    /// φ of Eq. 9 in thousandths, 0 to 999: the penalty for similar vertices. Default 100 (Section IV).
     pub penalty_permille: u16,
     /// σ_l of Eq. 7 and 9 in millimetres, 1 to 8188. Default 50; the paper does not give it.
     pub sigma_label_mm: u16,
     /// σ_c of Eq. 8 in millimetres, 1 to 8188. Default 30; the paper does not give it. Eq. 8 saturates at 64 σ_c, which
     /// is e⁻⁴⁰⁹⁶: with 30 mm, distances beyond 1920 mm, the infinite one included, all weigh the same.
     pub sigma_consistency_mm: u16,
-    /// Which half of Eq. 2 is taken. Default [`Direction::TwoSided`], as printed.
+    /// Which half of Eq. 2 counts. Default [`Direction::TwoSided`], as printed.
     pub direction: Direction,
 }
 

@@ -4,8 +4,8 @@ use crate::Fingerprint;
 
 /// The newest `32 · WORDS` fingerprints, a ring in fixed memory: 64 bytes a word.
 ///
-/// A position of the ring is also a bit of a state set of `WORDS` 32-bit words, which is what the consistency measure
-/// computes with; hence the unit of the capacity.
+/// The unit of the capacity is a word because the consistency measure computes with sets of positions, one bit each, in 32-bit
+/// words.
 ///
 /// ```
 /// use toposlam::{Fingerprint, History};
@@ -31,11 +31,11 @@ impl<const WORDS: usize> History<WORDS> {
 
     /// A history without observations.
     pub const fn new() -> Self {
-        const { assert!(WORDS.is_power_of_two(), "a power of two lets the ring run on for ever") };
+        const { assert!(WORDS.is_power_of_two(), "the capacity is a power of two, so that the counter can wrap") };
         Self { slots: [[Fingerprint::ZERO; 32]; WORDS], pushed: 0 }
     }
 
-    /// Appends an observation; returns the oldest one when it had to make room. Cost: O(1).
+    /// Appends an observation; returns the oldest one if it was dropped. Cost: O(1).
     pub fn push(&mut self, fingerprint: Fingerprint) -> Option<Fingerprint> {
         let full = self.len() == Self::CAPACITY;
         let next = self.pushed as usize % Self::CAPACITY;
@@ -46,7 +46,7 @@ impl<const WORDS: usize> History<WORDS> {
         full.then_some(dropped)
     }
 
-    /// How many observations are held, at most [`History::CAPACITY`].
+    /// How many observations the history contains, at most [`History::CAPACITY`].
     pub fn len(&self) -> usize {
         (self.pushed as usize).min(Self::CAPACITY)
     }
@@ -56,7 +56,7 @@ impl<const WORDS: usize> History<WORDS> {
         self.pushed == 0
     }
 
-    /// The observation `age` places ago, 0 for the newest; `None` beyond what is held.
+    /// The observation `age` places ago, 0 for the newest; `None` beyond the oldest.
     pub fn newest(&self, age: usize) -> Option<Fingerprint> {
         if age >= self.len() {
             return None;
@@ -65,7 +65,7 @@ impl<const WORDS: usize> History<WORDS> {
         self.slots.as_flattened().get(slot).copied()
     }
 
-    /// All observations held, the oldest first.
+    /// All observations, the oldest first.
     pub fn iter(&self) -> impl Iterator<Item = Fingerprint> + '_ {
         (0..self.len()).rev().filter_map(|age| self.newest(age))
     }

@@ -7,10 +7,10 @@ use crate::{Fingerprint, PaperConfig};
 /// One nat in the unit of log weights.
 pub(crate) const NAT: i32 = 1 << 16;
 
-/// How many label differences the table of the size penalty has.
+/// The number of label differences in the table of the penalty.
 const PENALTIES: usize = 256;
 
-/// Beyond this many `sigma_label_mm` Eq. 9 does not tell two labels from infinitely different ones: e^(−4.5²) is 2·10⁻⁹.
+/// From this many `sigma_label_mm` on, the penalty of Eq. 9 is taken as 0: e^(−4.5²) is 2·10⁻⁹.
 const PENALTY_REACH: f32 = 4.5;
 
 /// The constants of Eq. 7 to 9, computed once from a checked configuration.
@@ -50,13 +50,13 @@ impl Likelihood {
         }
     }
 
-    /// ln of Eq. 7: how well an observation fits the label of the vertex it is predicted at.
+    /// ln of **Eq. 7**: how well an observation fits the label of the vertex it is predicted at.
     pub(crate) fn ln_label(&self, observation: Fingerprint, label: Fingerprint) -> i32 {
         let difference_mm = u32::from(observation.distance_steps(label)) * u32::from(Fingerprint::STEP_MM);
         self.label_scale.ln_gaussian(difference_mm)
     }
 
-    /// ln of Eq. 8: how consistent the map is with the evidence, for a distance of Eq. 2 in millimetres.
+    /// ln of **Eq. 8**: how consistent the map is with the evidence, for a distance of Eq. 2 in millimetres.
     pub(crate) fn ln_consistency(&self, distance_mm: u16) -> i32 {
         self.consistency_scale.ln_gaussian(u32::from(distance_mm))
     }
@@ -72,7 +72,7 @@ impl Likelihood {
         u16::try_from(reach_mm + 2).unwrap_or(u16::MAX)
     }
 
-    /// ln of one factor of Eq. 9: the penalty for two labels that look alike.
+    /// ln of one factor of Eq. 9: the penalty for two similar labels.
     pub(crate) fn ln_penalty(&self, a: Fingerprint, b: Fingerprint) -> i32 {
         let difference = usize::from(a.distance_steps(b));
         let index = difference >> self.penalty_stride;
@@ -85,14 +85,12 @@ impl Likelihood {
         at + (((behind - at) * part) >> self.penalty_stride)
     }
 
-    /// How ln of Eq. 9, the price of the size of a map, changes when one vertex gets another label; `None` stands for
-    /// no vertex yet, so that a map's price is the sum of what its vertices brought. `others` are the labels of all
-    /// other vertices. Cost: O(V).
+    /// The change of ln of **Eq. 9**, the size of a map, when the label of a vertex changes; `None` stands for a vertex that is not
+    /// there yet. `others` are the labels of all other vertices. Cost: O(V).
     ///
-    /// As printed, the product runs over all ordered pairs, a = b included: every vertex costs a factor of 1 − φ even
-    /// when its label is like no other, and each pair counts twice. It is taken as printed: the factor of a = b is the
-    /// only one that prices a vertex as such. For φ = 1 it would make every map impossible, so the configuration
-    /// refuses that.
+    /// As printed, the product runs over all ordered pairs, a = b included: every vertex has a factor of 1 − φ even when no other
+    /// label is similar, and each pair counts twice. The code follows the print, because the factor of a = b is the only one
+    /// that penalises a vertex as such. For φ = 1 every map would be impossible, so the configuration excludes it.
     pub(crate) fn ln_size_change(
         &self,
         others: impl Iterator<Item = Fingerprint>,

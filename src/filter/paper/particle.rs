@@ -1,18 +1,18 @@
-//! One particle: a map, the place the robot is at, and the weight (Section III.A).
+//! One particle: a map, the vertex of the robot, and the weight (Section III.A).
 
 use crate::filter::PaperFactors;
 use crate::{Fingerprint, Map, VertexId};
 
-/// One hypothesis: a map and the place the robot is at.
+/// One hypothesis: a map and the vertex of the robot.
 #[derive(Clone, Copy, Debug)]
 pub struct Particle<const V: usize> {
     /// The map.
     pub map: Map<V>,
-    /// The vertex the robot is at.
+    /// The vertex of the robot.
     pub at: VertexId,
     /// How many of the N draws chose this particle.
     pub multiplicity: u8,
-    /// The index, among the particles before the last observation, of the one this particle came from.
+    /// The index of the particle before the last observation from which this one was predicted.
     pub parent: u8,
     /// The distance of Eq. 2 in millimetres; `u16::MAX` when it is infinite.
     pub consistency_mm: u16,
@@ -31,8 +31,8 @@ impl<const V: usize> Particle<V> {
     };
 }
 
-/// Predicts that the robot went from the place of a particle to a vertex, a new one behind the last: the edge is added
-/// when it is missing, and the observation goes into the label of the vertex.
+/// Predicts that the robot of a particle goes to a vertex, which may be a new one behind the last: adds the edge if it is
+/// missing, and the observation to the label of the vertex.
 pub(super) fn predict<const V: usize>(
     predicted: &mut Map<V>,
     parent: &Particle<V>,

@@ -1,4 +1,4 @@
-//! The particles and how one generation follows another (Section III.A).
+//! The particles, from one generation to the next (Section III.A).
 
 use super::particle::{Particle, predict};
 use super::resample::PROPOSAL_REACH;
@@ -9,10 +9,10 @@ use crate::map::PerVertex;
 use crate::top_k::insertion_sort;
 use crate::{Fingerprint, Map, NgramLength, PaperConfig};
 
-/// What a step tells besides the particles.
+/// The result of a step besides the particles.
 pub(super) struct Step {
     pub(super) lead_q16: i32,
-    /// A particle wanted one more vertex than a map can hold.
+    /// The map of a particle had no room for another vertex.
     pub(super) vertices_full: bool,
 }
 

@@ -1,9 +1,8 @@
-//! What is known of the environment from an earlier exploration: Γ_env of the paper.
+//! The n-grams of an earlier exploration: Γ_env of the paper.
 
 use crate::{Consistency, Ngram, NgramLength, NgramTable, NgramsFull};
 
-/// The n-grams of an earlier exploration, at most `16 · WORDS` of them, with the scratch memory to hold maps of `V`
-/// vertices against them.
+/// At most `16 · WORDS` n-grams of an earlier exploration, with the memory to compare them with maps of `V` vertices.
 ///
 /// Memory: about `92 · V · (WORDS + 1) + 184 · WORDS` bytes.
 #[derive(Clone, Debug)]
@@ -23,19 +22,19 @@ impl<const V: usize, const WORDS: usize> Prior<V, WORDS> {
         &self.ngrams
     }
 
-    /// Adds one n-gram; says whether it is new.
+    /// Adds one n-gram; returns whether it is new.
     ///
     /// # Errors
-    /// [`NgramsFull`] when there is no room for it; the prior stays as it is.
+    /// [`NgramsFull`] if there is no room for it; the prior does not change then.
     pub fn insert(&mut self, ngram: Ngram) -> Result<bool, NgramsFull> {
         self.consistency.forget();
         self.ngrams.insert(ngram)
     }
 
-    /// Adds what the newest observation of an exploration brings; see [`NgramTable::extend`].
+    /// Adds the n-grams that end at the newest observation of an exploration; see [`NgramTable::extend`].
     ///
     /// # Errors
-    /// [`NgramsFull`] when some n-grams did not fit; the others were added.
+    /// [`NgramsFull`] if some n-grams did not fit; the others were added.
     pub fn extend<const POSITIONS: usize>(
         &mut self,
         exploration: &crate::History<POSITIONS>,
@@ -44,7 +43,7 @@ impl<const V: usize, const WORDS: usize> Prior<V, WORDS> {
         self.ngrams.extend(exploration)
     }
 
-    /// The n-grams and the scratch memory, both at once.
+    /// The n-grams and the memory to compare them with maps.
     pub(super) fn split(&mut self) -> (&NgramTable<WORDS>, &mut Consistency<V, WORDS, 7>) {
         (&self.ngrams, &mut self.consistency)
     }

@@ -1,28 +1,28 @@
 //! Drawing the next particles from the predictions, by rejection.
 //!
-//! A prediction is proposed in proportion to Eq. 7 · Eq. 9, which cost little, and accepted in proportion to Eq. 8, which
-//! is dear: what is accepted is drawn in proportion to the weight of Eq. 6, and Eq. 8 is computed for what is proposed
-//! only.
+//! A prediction is proposed in proportion to Eq. 7 · Eq. 9, which cost little, and accepted in proportion to Eq. 8, which is
+//! expensive. So accepted predictions are draws in proportion to the weight of Eq. 6, and Eq. 8 is computed only for
+//! predictions that are proposed.
 
 use crate::filter::paper::likelihood::NAT;
 
-/// A prediction whose Eq. 7 · Eq. 9 is this many nats below the best one is never proposed: e⁻¹⁵ · 2²⁰ rounds to 0. A label
-/// that is 3.9 σ_l off is out of the question then, however well the map would fit the evidence.
+/// A prediction whose Eq. 7 · Eq. 9 is this many nats below the best one is never proposed: e⁻¹⁵ · 2²⁰ rounds to 0. That
+/// is a label that is 3.9 σ_l off, however well the map fits the evidence.
 pub(super) const PROPOSAL_REACH: i32 = 15 * NAT;
 
 /// A proposal that fits the evidence this many nats worse than the best is never accepted: e⁻²³ · 2³² rounds to 0.
 pub(super) const ACCEPTANCE_REACH: i32 = 23 * NAT;
 
-/// How much worse than the best a prediction may fit the evidence before its distance no longer matters: then its weight
-/// rounds to 0 whatever its Eq. 7 and 9 are.
+/// A prediction that fits the evidence this much worse than the best has a weight that rounds to 0, whatever its Eq. 7 and 9
+/// are, so its distance does not matter.
 pub(super) const DISTANCE_REACH: i32 = PROPOSAL_REACH + ACCEPTANCE_REACH;
 
-/// How many proposals a step makes before it computes Eq. 8 of all predictions and draws the rest without rejecting. It
-/// bounds the time of a step whose proposals hardly ever fit the evidence.
+/// After this many proposals a step computes Eq. 8 of all predictions and draws the rest without rejection. This bounds the
+/// time of a step whose proposals seldom fit the evidence.
 pub(super) const PROPOSALS: u16 = 128;
 
-/// How often a prediction is drawn, relative to the best one, in units of 2⁻²⁰ and rounded. Only ratios count, which
-/// spares the division of Eq. 4.
+/// How often a prediction is drawn, relative to the best one, in units of 2⁻²⁰ and rounded. Only ratios count, so the
+/// division of Eq. 4 is not needed.
 pub(super) fn draw_weight(ln_weight: i32, ln_best: i32) -> u32 {
     let behind = ln_best.saturating_sub(ln_weight);
     if behind >= PROPOSAL_REACH {
@@ -40,7 +40,7 @@ fn relative(behind: i32) -> f32 {
     libm::expf(-(behind as f32) / NAT as f32)
 }
 
-/// Where a draw points to in the sum of all weights.
+/// The position of a draw in the sum of all weights.
 pub(super) fn target(draw: u32, total: u64) -> u64 {
     // A total has at most 20 bits of weight, 8 of multiplicity and 14 of candidates.
     let (high, low) = (total >> 16, total & 0xFFFF);

@@ -8,8 +8,7 @@ use crate::filter::paper::likelihood::Likelihood;
 use crate::map::PerVertex;
 use crate::{Fingerprint, Map, NgramLength, VertexId};
 
-/// A prediction: that the robot of a particle went to a vertex, a new one behind the last of its map. In the order of the
-/// pool.
+/// A prediction: the robot of a particle goes to a vertex, which may be a new one behind the last. Ordered as the pool is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(super) struct Choice {
     pub(super) parent: u8,
@@ -28,14 +27,14 @@ pub(super) struct Candidate {
     distance: Distance,
 }
 
-/// What is known of the distance of Eq. 2 of a prediction.
+/// The distance of Eq. 2 of a prediction, as far as it was computed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Distance {
-    /// Only that no prediction is nearer to the evidence than the nearest.
+    /// Not computed: at least that of the nearest prediction.
     Unknown,
     /// The distance in millimetres; `u16::MAX` when it is infinite.
     Known(u16),
-    /// So large that the prediction is never accepted.
+    /// So large that the prediction is not accepted.
     TooLarge,
 }
 
@@ -43,7 +42,7 @@ impl Candidate {
     pub(super) const UNSET: Self = Self { ln_proposal: 0, distance: Distance::Unknown };
 }
 
-/// The particles of one place, the pool of their predictions, and what these are held against.
+/// The particles of one place, the pool of their predictions, and the evidence.
 pub(super) struct Selection<'a, E, const N: usize, const V: usize, const WORDS: usize, const INDICES: usize> {
     pub(super) parents: &'a [Particle<V>],
     pub(super) pool: &'a mut [PerVertex<Candidate, V>; N],
@@ -81,8 +80,8 @@ impl<E: Evidence<WORDS>, const N: usize, const V: usize, const WORDS: usize, con
         }
     }
 
-    /// Finds the distance of the prediction that is nearest to the evidence, among those that can be proposed. Most of the
-    /// others are only shown to be no nearer, which takes much less than their distance.
+    /// Finds the distance of the prediction that is nearest to the evidence, among those that can be proposed. For most of the
+    /// others it only shows that they are not nearer, which costs much less than their distance.
     pub(super) fn find_nearest(&mut self) {
         let weights = self.weights().map(|(choice, weight)| (weight, choice));
         let Some((_, first)) = weights.max_by_key(|&(weight, choice)| (weight, core::cmp::Reverse(choice))) else {
@@ -112,7 +111,7 @@ impl<E: Evidence<WORDS>, const N: usize, const V: usize, const WORDS: usize, con
         };
     }
 
-    /// The distance of a prediction, if it is not above a limit; mostly it is.
+    /// The distance of a prediction if it is not above a limit. For most predictions it is.
     fn nearest_of(&mut self, choice: Choice, limit: u16) -> Option<u16> {
         let mut nearest = self.search(choice, (limit, limit))?;
         let mut stride = 1;
@@ -149,7 +148,7 @@ impl<E: Evidence<WORDS>, const N: usize, const V: usize, const WORDS: usize, con
         }
     }
 
-    /// Weighs every prediction by all of Eq. 6, so that what is proposed from now on need not be accepted.
+    /// Weighs every prediction by Eq. 6 as a whole: the following proposals are draws without rejection.
     fn weigh_all(&mut self) {
         let mut ln_best = i32::MIN;
         for choice in choices(self.parents) {
@@ -209,7 +208,7 @@ impl<E: Evidence<WORDS>, const N: usize, const V: usize, const WORDS: usize, con
         ln_rival
     }
 
-    /// The prediction that a target in the sum of all weights falls to.
+    /// The prediction at a position in the sum of all weights.
     fn propose(&self, target: u64) -> Option<Choice> {
         let mut sum = 0;
         let mut weights = self.weights();
@@ -252,8 +251,8 @@ impl<E: Evidence<WORDS>, const N: usize, const V: usize, const WORDS: usize, con
         }
     }
 
-    /// The distance of a prediction, searched for when it is not known yet. It matters as long as ln of Eq. 8 is no more
-    /// than `reach` behind that of the nearest prediction.
+    /// The distance of a prediction, computed if it is not known yet. It matters while ln of Eq. 8 is at most `reach` behind that of
+    /// the nearest prediction.
     fn distance(&mut self, choice: Choice, reach: i32) -> Distance {
         let known = self.candidate(choice).map_or(Distance::TooLarge, |candidate| candidate.distance);
         if known != Distance::Unknown {

@@ -81,6 +81,16 @@ impl<const N: usize, const V: usize, const T: usize> Beam<N, V, T> {
         self.len
     }
 
+    /// The best hypothesis.
+    pub(crate) fn best(&self) -> Option<&Hypothesis<V, T>> {
+        self.get(0)
+    }
+
+    /// The best hypothesis.
+    pub(crate) fn best_mut(&mut self) -> Option<&mut Hypothesis<V, T>> {
+        self.get_mut(0)
+    }
+
     /// The hypothesis of a rank, the best at 0.
     pub(crate) fn get(&self, rank: usize) -> Option<&Hypothesis<V, T>> {
         let slot = self.order.get(..self.len)?.get(rank)?;
@@ -115,7 +125,7 @@ impl<const N: usize, const V: usize, const T: usize> Beam<N, V, T> {
     /// The score that a new hypothesis must exceed.
     pub(crate) fn threshold(&self, wanted: usize) -> f32 {
         let worst = self.get(self.len.saturating_sub(1)).filter(|_| self.len >= wanted.min(N));
-        let best = self.get(0).map_or(f32::NEG_INFINITY, Hypothesis::score);
+        let best = self.best().map_or(f32::NEG_INFINITY, Hypothesis::score);
         worst.map_or(best - UNLIKELY, Hypothesis::score)
     }
 
@@ -303,11 +313,11 @@ mod tests {
     fn a_hypothesis_with_the_same_map_is_replaced_only_by_a_better_one() {
         let mut beam = Box::new(Beam::<6, 5, 32>::new());
         beam.clear();
-        let mut same = *beam.get(0).unwrap();
+        let mut same = *beam.best().unwrap();
         assert!(!beam.insert(&same, WANTED));
         same.evidence = 1.0;
         assert!(beam.insert(&same, WANTED));
-        assert_eq!((beam.len(), beam.get(0).map(Hypothesis::score)), (1, Some(1.0)));
+        assert_eq!((beam.len(), beam.best().map(Hypothesis::score)), (1, Some(1.0)));
         same.evidence = 0.5;
         assert!(!beam.insert(&same, WANTED));
         same.at = VertexId::new(1);

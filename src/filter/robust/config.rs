@@ -9,13 +9,13 @@ use crate::setters::setters;
 pub struct RobustConfig {
     /// How many distinct hypotheses are kept, 1 to the filter's capacity. Default 10.
     pub hypotheses: u8,
-    /// A first guess at the standard deviation of a fingerprint in millimetres, 1 to 1000. Default 30; the filter then
-    /// estimates it from its best map.
+    /// The first guess of the standard deviation of a fingerprint in millimetres, 1 to 1000. Default 30. From the tenth place on
+    /// the filter estimates it from its best map.
     pub noise_mm: u16,
-    /// The step of the fingerprints in millimetres, 1 to 1000: noise well below it is not believed. Default 2.
+    /// The resolution of the fingerprints in millimetres, 1 to 1000: the estimate of the noise is at least 0.7 of it. Default 2.
     pub resolution_mm: u16,
-    /// How many repair moves are tried at each place, 0 to 255. Default 1; more are made by `RobustFilter::refine`, in
-    /// the time between two places.
+    /// The number of refinement proposals at each place, 0 to 255. Default 1. [`Filter::refine`](crate::Filter::refine) makes more
+    /// between two places.
     pub moves: u8,
     /// How often a turn hint is wrong, in thousandths, 1 to 500. Default 20.
     pub wrong_turn_permille: u16,

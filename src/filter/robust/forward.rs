@@ -12,7 +12,7 @@ use crate::map::{PerVertex, VertexId};
 /// The product of the normalisers is turned into a logarithm below this.
 const SMALL: f32 = 1e-12;
 
-/// What the forward pass found out.
+/// The belief of the last forward pass.
 #[derive(Clone, Debug)]
 pub(super) struct Forward<const V: usize> {
     /// The probability of each vertex at the newest observation.
@@ -70,7 +70,7 @@ impl<const V: usize> Forward<V> {
             before: None,
             earlier: None,
         };
-        let Some((column, cells)) = lattice.walk(&mut sum, (model, history, hmm), ALL, hypothesis.before) else {
+        let Some((column, cells, _)) = lattice.walk(&mut sum, (model, history, hmm), ALL, hypothesis.before) else {
             return 0.0;
         };
         self.belief.fill(0.0);
@@ -130,7 +130,7 @@ impl<const V: usize> Semiring for AllPaths<'_, V> {
         }
     }
 
-    fn close(&mut self, _: &Stage, _: &Cells, _: &Column) -> f32 {
+    fn close(&mut self, _: &Stage, _: &Column, _: &Cells, _: usize) -> f32 {
         // The cells are normalised: all paths of the sequence before lead here.
         1.0
     }

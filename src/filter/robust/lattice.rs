@@ -1,5 +1,5 @@
 //! The lattice of a history: for each observation a column of vertices that may explain it, and one walk along the columns that
-//! computes over all paths what a semiring says. [`Viterbi`](super::viterbi::Viterbi) walks with the maximum and the sum of
+//! computes a sum over all paths in a semiring. [`Viterbi`](super::viterbi::Viterbi) walks with the maximum and the sum of
 //! logarithms, the [forward pass](super::forward::Forward) with the sum and the product of probabilities.
 //!
 //! A turn hint speaks of three successive vertices, so a cell of the walk stands for a pair of successive vertices. Where the
@@ -133,7 +133,7 @@ pub(super) struct Stage {
     pub(super) is_second: bool,
 }
 
-/// A semiring, and what is noted on the walk.
+/// A semiring, and the results that are noted on the walk.
 pub(super) trait Semiring {
     /// The value of no path.
     const ZERO: f32;
@@ -144,8 +144,9 @@ pub(super) trait Semiring {
     /// Takes the column of the next observation: adds states to it, weighs it.
     fn enter(&mut self, stage: &Stage, column: &mut Column);
 
-    /// The value of all paths to the last observation of a sequence: a factor of those that start behind it.
-    fn close(&mut self, stage: &Stage, cells: &Cells, column: &Column) -> f32;
+    /// The value of all paths to the last observation of a sequence, whose column and cells are given: a factor of the paths that
+    /// start behind it. `rows` of the cells are in use.
+    fn close(&mut self, stage: &Stage, column: &Column, cells: &Cells, rows: usize) -> f32;
 
     /// The value of the paths that start with a state, from the vertex before the history if there is one.
     fn start(&mut self, closed: f32, from: Option<VertexId>, slot: Slot, state: &State) -> f32;
@@ -195,7 +196,7 @@ impl Lattice {
         Self { cells: [cells(0.0); 2] }
     }
 
-    /// Walks along the history. Returns the column of the newest observation and the cells there.
+    /// Walks along the history. Returns the column of the newest observation, its cells, and how many rows of them are in use.
     ///
     /// Cost: O(T · (V + WIDTH²)).
     #[inline(always)]
@@ -205,7 +206,7 @@ impl Lattice {
         (model, history, hmm): (&Model, &ObservationHistory<T>, &Hmm<V>),
         allowed: VertexSet32,
         before: Option<VertexId>,
-    ) -> Option<(Column, &Cells)> {
+    ) -> Option<(Column, &Cells, usize)> {
         let mut columns = [Column::EMPTY; 3];
         let [cells, next] = &mut self.cells;
         let mut rows = 0;
@@ -219,7 +220,7 @@ impl Lattice {
             semiring.enter(&stage, there);
             *next = self::cells(S::ZERO);
             if starts {
-                let closed = semiring.close(&stage, cells, here);
+                let closed = semiring.close(&stage, here, cells, rows);
                 let from = if observation.starts_sequence() { None } else { before };
                 for (slot, state) in there.iter() {
                     next[Slot::FIRST][slot] = semiring.start(closed, from, slot, state);
@@ -254,6 +255,6 @@ impl Lattice {
             core::mem::swap(cells, next);
             columns.rotate_left(1);
         }
-        Some((columns[1], cells))
+        Some((columns[1], cells, rows))
     }
 }

@@ -10,7 +10,7 @@
 //! |---|---|
 //! | `history`, `statistics`, `hypothesis`, `marginalisation` | the state |
 //! | `model`, `special_functions`, `noise` | the generative model |
-//! | `growth`, `beam` | one more observation |
+//! | `step`, `growth`, `beam` | one more observation |
 //! | `proposals`, `merge_proposals`, `split_proposals`, `merge` | refinement |
 //! | `lattice`, `hmm`, `viterbi`, `forward` | paths: the best one, and all |
 //! | `vertex_ids`, `publish`, `worst_ngram` | what is published |
@@ -33,6 +33,7 @@ mod publish;
 mod special_functions;
 mod split_proposals;
 pub(crate) mod statistics;
+mod step;
 #[cfg(feature = "_test")]
 mod testing;
 pub(crate) mod vertex_ids;
@@ -43,7 +44,7 @@ pub use config::RobustConfig;
 
 use super::{Filter, FilterCapacities, Update, WorstNgram, draws};
 use crate::map::PerVertex;
-use crate::{ConfigError, FaultCounters, FaultKind, Fingerprint, Map, Observation, VertexId};
+use crate::{ConfigError, FaultCounters, Fingerprint, Map, Observation, VertexId};
 use beam::Beam;
 use forward::Forward;
 use history::ObservationHistory;
@@ -54,14 +55,6 @@ use model::Model;
 use proposals::Proposals;
 use vertex_ids::VertexIds;
 use viterbi::Viterbi;
-
-/// The noise is estimated from this place on.
-const NOISE_FROM: u32 = 10;
-/// Until this place it is estimated at every fifth place, then at every tenth.
-const NOISE_OFTEN_UNTIL: u32 = 40;
-
-/// For how many hypotheses the bound of the other paths is updated at a place, until that of the best one is.
-const BOUND_UPDATES: u8 = 3;
 
 /// The robust filter with at most `N` hypotheses, maps of at most `V` vertices (2 to 32), and a history of the newest `HISTORY`
 /// places. Proposals can revise what the history contains; what is older is marginalised.
@@ -174,7 +167,7 @@ impl<const N: usize, const V: usize, const HISTORY: usize> RobustFilter<N, V, HI
         }
         self.localise_only = localise_only;
         self.beam.keep_best();
-        if !localise_only && let Some(best) = self.beam.get_mut(0) {
+        if !localise_only && let Some(best) = self.beam.best_mut() {
             best.recount(&self.model, &self.history);
         }
     }
@@ -188,104 +181,6 @@ impl<const N: usize, const V: usize, const HISTORY: usize> RobustFilter<N, V, HI
     /// How many places were observed.
     pub fn observed(&self) -> u32 {
         self.observed
-    }
-
-    /// Adds an observation to the history and to all hypotheses.
-    fn extend(&mut self, mut observation: Observation) {
-        observation.starts_sequence |= self.history.is_empty();
-        if self.history.is_full() {
-            self.faults.record(FaultKind::HistoryFull);
-            self.marginalise_oldest();
-        }
-        let index = self.history.len();
-        self.history.push(&observation);
-        let wanted = usize::from(self.config.hypotheses);
-        if let Some(newest) = self.history.get(index)
-            && self.beam.grow(&self.model, &self.history, (index, newest), wanted, self.localise_only)
-        {
-            self.faults.record(FaultKind::VerticesFull);
-        }
-    }
-
-    /// Moves the oldest observation out of the history.
-    fn marginalise_oldest(&mut self) {
-        let history = &self.history;
-        let mut has_decayed = false;
-        self.beam.for_each(|hypothesis| has_decayed |= hypothesis.marginalise_oldest(history));
-        self.vertex_ids.drop_oldest();
-        self.history.drop_oldest();
-        // While the filter only localises, the statistics of the map do not change.
-        if has_decayed && !self.localise_only {
-            let (model, history) = (&self.model, &self.history);
-            self.beam.for_each(|hypothesis| hypothesis.rebase(model, history));
-            let common = self.beam.get(0).map_or(0.0, |best| best.decayed);
-            self.beam.for_each(|hypothesis| hypothesis.subtract_decayed(common));
-        }
-    }
-
-    /// Notes where the robot was kidnapped: where the best path does not follow an edge of the map.
-    fn detect_kidnapping(&mut self) {
-        let Some(best) = self.beam.get(0) else { return };
-        for index in 1..self.history.len() {
-            if let (Some(from), Some(to)) = (best.vertex_of(index - 1), best.vertex_of(index)) {
-                self.history.set_kidnapped(index, !best.is_edge(from, to));
-            }
-        }
-    }
-
-    /// Updates the bound of the other paths of the best hypotheses, until that of the best one is up to date, and the belief.
-    fn update_bound(&mut self) {
-        for round in 1..=BOUND_UPDATES {
-            let Some(best) = self.beam.get_mut(0) else { return };
-            self.forward.update_bound(&mut self.lattice, &self.model, &self.history, &mut self.hmm, best);
-            let key = best.key();
-            // The last one is published even if another is better now, because the belief is its own.
-            if self.localise_only || round == BOUND_UPDATES {
-                return;
-            }
-            self.beam.sort();
-            if self.beam.get(0).is_some_and(|best| best.key() == key) {
-                return;
-            }
-        }
-    }
-
-    /// Estimates the noise, and computes the evidence of all hypotheses with it.
-    fn estimate_noise(&mut self) {
-        let resolution = f32::from(self.config.resolution_mm) / f32::from(Fingerprint::STEP_MM);
-        let Some(deviation) = self.beam.get(0).and_then(|best| noise::deviation_steps(&self.history, best, resolution))
-        else {
-            return;
-        };
-        self.model.set_noise(deviation);
-        let model = &self.model;
-        self.beam.for_each(|hypothesis| hypothesis.evidence = hypothesis.total(model));
-        self.beam.sort();
-    }
-
-    /// As [`Filter::observe`].
-    fn step(&mut self, observation: Observation) -> Update {
-        if self.localise_only && self.beam.get(0).is_none_or(|best| best.vertices == 0) {
-            // No hypothesis has a vertex for it.
-            let place_index = self.observed;
-            self.observed = self.observed.wrapping_add(1);
-            return Update { place_index, ..Update::NONE };
-        }
-        self.extend(observation);
-        self.refinements = 0;
-        if self.localise_only {
-            self.detect_kidnapping();
-        } else {
-            for _ in 0..self.config.moves {
-                self.refine();
-            }
-        }
-        self.observed = self.observed.wrapping_add(1);
-        let interval = if self.observed < NOISE_OFTEN_UNTIL { 5 } else { 10 };
-        if !self.localise_only && self.observed >= NOISE_FROM && self.observed.is_multiple_of(interval) {
-            self.estimate_noise();
-        }
-        self.refresh()
     }
 }
 

@@ -17,7 +17,7 @@ const DECODINGS: usize = 2;
 /// A proposal that is this far below the worst hypothesis is dropped before the bound of its other paths is updated, in nats.
 const SLACK: f32 = 6.0;
 
-/// What the proposals work with.
+/// The state and the working memory of the proposals.
 pub(super) struct Proposals<'a, const V: usize, const T: usize> {
     pub(super) model: &'a Model,
     pub(super) history: &'a ObservationHistory<T>,

@@ -17,7 +17,7 @@ const EXPLAINED_DEVIATIONS: f32 = 5.0;
 impl<const N: usize, const V: usize, const HISTORY: usize> RobustFilter<N, V, HISTORY> {
     /// Publishes the best map.
     pub(super) fn publish(&mut self) -> Update {
-        let Some(best) = self.beam.get(0) else { return Update::NONE };
+        let Some(best) = self.beam.best() else { return Update::NONE };
         if self.localise_only {
             self.vertex_ids.keep(&self.history, best);
         } else {
@@ -75,7 +75,7 @@ impl<const N: usize, const V: usize, const HISTORY: usize> RobustFilter<N, V, HI
 
     /// The log evidence of the best hypothesis, and the bound of its map's other paths, in nats.
     pub fn evidence(&self) -> (f32, f32) {
-        self.beam.get(0).map_or((0.0, 0.0), |best| (best.evidence, best.other_paths))
+        self.beam.best().map_or((0.0, 0.0), |best| (best.evidence, best.other_paths))
     }
 
     /// The standard deviation of the labels that is in use, in millimetres.

@@ -20,6 +20,6 @@ impl<const N: usize, const V: usize, const HISTORY: usize> RobustFilter<N, V, HI
         self.draft.rebuild(&self.model, &self.history);
         self.beam.start_with(&self.draft);
         self.refresh();
-        self.beam.get(0).map(|best| best.score())
+        self.beam.best().map(|best| best.score())
     }
 }

@@ -63,8 +63,8 @@ impl<const T: usize> Viterbi<T> {
             next_origins: PerSlot([Slot::FIRST; WIDTH]),
         };
         let end = lattice.walk(&mut paths, (model, history, hmm), allowed, hypothesis.before);
-        if let Some((column, cells)) = end {
-            let (from, at, _) = best_pair(cells, &column);
+        if let Some((column, cells, rows)) = end {
+            let (from, at, _) = best_pair(&column, cells, rows);
             self.trace((model, history, hmm), allowed, hypothesis, (from, at));
         }
     }
@@ -174,9 +174,9 @@ impl<const V: usize> Semiring for BestPath<'_, V> {
         }
     }
 
-    fn close(&mut self, stage: &Stage, cells: &Cells, column: &Column) -> f32 {
+    fn close(&mut self, stage: &Stage, column: &Column, cells: &Cells, rows: usize) -> f32 {
         let Some(before) = stage.index.checked_sub(1) else { return 0.0 };
-        let (best, second, score) = best_pair(cells, column);
+        let (best, second, score) = best_pair(column, cells, rows);
         self.note(before, Slot::FIRST, Back { best, second, turned: 0 });
         score
     }
@@ -262,9 +262,9 @@ impl<const V: usize> Semiring for BestPath<'_, V> {
 }
 
 /// The best pair of the cells of a column.
-fn best_pair(cells: &Cells, column: &Column) -> (Slot, Slot, f32) {
+fn best_pair(column: &Column, cells: &Cells, rows: usize) -> (Slot, Slot, f32) {
     let mut best = (Slot::FIRST, Slot::FIRST, f32::NEG_INFINITY);
-    for from in Slot::first(WIDTH) {
+    for from in Slot::first(rows) {
         for at in Slot::first(column.len()) {
             let score = cells[from][at];
             if score > best.2 {

@@ -62,7 +62,7 @@ impl<const N: usize, const V: usize, const HISTORY: usize> Persist for RobustFil
         writer.u8(0)?;
         let len = self.history.len();
         if self.localise_only
-            && let Some(best) = self.beam.get(0)
+            && let Some(best) = self.beam.best()
         {
             best.save_kept(writer)?;
         }
@@ -145,7 +145,7 @@ impl<const N: usize, const V: usize, const HISTORY: usize> RobustFilter<N, V, HI
     fn make_canonical(&mut self) {
         if self.localise_only {
             // The map is kept as it is, so all have that of the best one.
-            if let Some(best) = self.beam.get(0) {
+            if let Some(best) = self.beam.best() {
                 self.draft.clone_from(best);
                 let kept = &self.draft;
                 self.beam.for_each(|hypothesis| hypothesis.keep_map_of(kept));

@@ -3,6 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use super::List;
+use crate::top_k::TopK;
 use crate::wire::robot::bit;
 use crate::{Filter, VertexId, VertexSet};
 
@@ -29,17 +30,13 @@ pub struct VertexProbability {
 impl Belief {
     /// The belief of a filter after a place. Cost: O(8 · V).
     pub fn of<const V: usize>(filter: &impl Filter<V>, place_index: u32) -> Self {
-        let mut most_probable = [VertexProbability::default(); 8];
+        let mut most_probable = TopK::<VertexProbability, 8>::new(VertexProbability::default());
         for vertex in filter.map().vertices() {
             let permille = permille(filter.vertex_probability_q16(vertex));
-            let mut candidate = VertexProbability { vertex: vertex.into(), permille };
-            for slot in &mut most_probable {
-                if candidate.permille > slot.permille {
-                    core::mem::swap(slot, &mut candidate);
-                }
-            }
+            let candidate = VertexProbability { vertex: vertex.into(), permille };
+            most_probable.insert(candidate, |one, other| one.permille >= other.permille);
         }
-        let vertices = List::new(most_probable.into_iter().take_while(|candidate| candidate.permille > 0));
+        let vertices = List::new(most_probable.as_slice().iter().copied().filter(|candidate| candidate.permille > 0));
         Self { place_index, map_permille: permille(filter.map_probability_q16()), vertices }
     }
 

@@ -1,24 +1,24 @@
 //! From the map to the evidence: is every walk of the map near some n-gram of the evidence?
 //!
 //! A walk of `n` vertices is two *arms* of `⌈n/2⌉` vertices that meet: at one vertex when `n` is odd, over an edge when it
-//! is even. It is confirmed when the states that either arm may have been read to meet as well. Of the arms that end at a
-//! vertex only those with minimal sets of states matter: what meets a set meets all that it lies within.
+//! is even. It is confirmed when the sets of states that the readings of both arms reach meet as well. Of the arms that end at
+//! a vertex only those with minimal sets of states matter: a set that meets another one meets all supersets of it.
 
 use super::{Consistency, evidence::Evidence, readings::Readings, state_set::StateSet, witness::Walk};
 use crate::map::PerVertex;
 use crate::{Map, NgramLength, VertexId, VertexSet};
 
-/// How many arms are held at once; more are taken in blocks.
+/// How many arms are compared at once; more are compared in blocks.
 const BLOCK: usize = 14;
 
-/// How many minimal tails of a vertex are kept; the tails of a vertex with more are read anew each time.
+/// How many minimal tails of a vertex are kept; the tails of a vertex with more are read again each time.
 const TAILS: usize = 6;
 
-/// A reading along some vertices, and the states it may have got to.
+/// A reading along some vertices, and the states that it reaches.
 #[derive(Clone, Copy, Debug)]
 struct Arm<const WORDS: usize> {
     states: StateSet<WORDS>,
-    /// The vertices, that of the last label first.
+    /// The vertices, the one of the last label first.
     path: [VertexId; LONGEST_ARM],
 }
 
@@ -31,9 +31,9 @@ const LONGEST_ARM: usize = NgramLength::MAX.get().div_ceil(2) as usize;
 impl<const WORDS: usize> Arm<WORDS> {
     const NONE: Self = Self { states: StateSet::EMPTY, path: [NONE; LONGEST_ARM] };
 
-    /// Adds this arm to a list of arms with minimal states, unless one of them has its states within those of this one;
-    /// those that have these states within theirs leave. The number of arms in the list is returned, or `None` when
-    /// there is no room; then nothing that mattered has left.
+    /// Adds this arm to a list of arms with minimal sets of states, unless the set of one of them is a subset of its own; removes
+    /// those whose sets are supersets. Returns the number of arms in the list, or `None` if there is no room; the list is then
+    /// as minimal as before.
     fn insert_minimal(&self, arms: &mut [Self], held: usize) -> Option<usize> {
         if arms.iter().take(held).any(|arm| self.states.contains_all(&arm.states)) {
             return Some(held);
@@ -52,21 +52,21 @@ impl<const WORDS: usize> Arm<WORDS> {
     }
 }
 
-/// The scratch memory of one question.
+/// The memory for one threshold.
 #[derive(Clone, Debug)]
 pub(super) struct Arms<const V: usize, const WORDS: usize> {
     block: [Arm<WORDS>; BLOCK],
-    /// For each vertex, where the readings of a tail that ends there may go on to: the minimal ones.
+    /// For each vertex, the minimal sets of states that can follow a tail that ends there.
     tails: PerVertex<[Arm<WORDS>; TAILS], V>,
-    /// For each vertex, the tails it has: bits of kept ones, [`UNREAD`], or [`TOO_MANY`].
+    /// For each vertex, its tails: one bit for each that is kept, [`UNREAD`], or [`TOO_MANY`].
     kept: PerVertex<u8, V>,
-    /// For each vertex, where the reading of its label alone may go on to.
+    /// For each vertex, the states that can follow its label alone.
     ahead: PerVertex<StateSet<WORDS>, V>,
-    /// The vertices whose `ahead` was read.
+    /// The vertices whose `ahead` is valid.
     is_ahead: VertexSet,
 }
 
-/// The tails of a vertex were not asked for yet.
+/// The tails of a vertex are not read yet.
 const UNREAD: u8 = 0;
 /// A vertex has more minimal tails than are kept.
 const TOO_MANY: u8 = 1 << TAILS;
@@ -112,7 +112,7 @@ impl<const V: usize, const WORDS: usize, const INDICES: usize> Consistency<V, WO
     }
 }
 
-/// A map and a distance held against evidence.
+/// A map and a threshold, to be confirmed by the evidence.
 struct Question<'a, E, const V: usize, const WORDS: usize, const INDICES: usize> {
     map: &'a Map<V>,
     evidence: &'a E,
@@ -179,7 +179,7 @@ impl<E: Evidence<WORDS>, const V: usize, const WORDS: usize, const INDICES: usiz
         Err(walk)
     }
 
-    /// Whether all arms along the ways that are still to come meet each of a block.
+    /// Whether all arms along the remaining ways meet each arm of a block.
     fn all_meet(&mut self, block: &[Arm<WORDS>], mut ways: Ways) -> Result<(), Walk> {
         while let Some(arm) = self.next_arm(&mut ways) {
             block.iter().try_for_each(|other| self.meet(other, &arm))?;
@@ -251,7 +251,7 @@ impl<E: Evidence<WORDS>, const V: usize, const WORDS: usize, const INDICES: usiz
         self.tails[vertex].get(number.index()).copied().unwrap_or(Arm::NONE)
     }
 
-    /// Where the reading of a tail may go on to: a tail of two labels begins at the neighbour with a number.
+    /// The states that can follow a tail. A tail of two labels starts at the neighbour with this number.
     fn read_tail(&mut self, vertex: VertexId, number: VertexId) -> Arm<WORDS> {
         let path = [vertex, number, NONE, NONE];
         if self.tail_labels() == 1 {
@@ -261,7 +261,7 @@ impl<E: Evidence<WORDS>, const V: usize, const WORDS: usize, const INDICES: usiz
         Arm { states: self.evidence.around(&states), path }
     }
 
-    /// Where the reading of the label of one vertex may go on to.
+    /// The states that can follow the label of one vertex.
     fn ahead(&mut self, vertex: VertexId) -> StateSet<WORDS> {
         if !self.is_ahead.contains(vertex) {
             self.is_ahead.insert(vertex);
@@ -277,14 +277,14 @@ impl<E: Evidence<WORDS>, const V: usize, const WORDS: usize, const INDICES: usiz
     }
 }
 
-/// All walks of two or three vertices that start at a vertex, in a fixed order, and the tails at the end of the current.
+/// All walks of two or three vertices from a vertex, in a fixed order, and the tails at the end of the current one.
 #[derive(Clone)]
 struct Ways {
     path: [VertexId; 3],
-    /// For every vertex of the path but the first, its siblings that are still to come.
+    /// For every vertex of the path but the first, the alternatives that remain.
     waiting: [VertexSet; 3],
     vertices: u8,
-    /// The tails at the end of the current walk that are still to come.
+    /// The tails at the end of the current walk that remain.
     tails: VertexSet,
 }
 

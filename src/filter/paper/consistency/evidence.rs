@@ -1,31 +1,31 @@
-//! Sets of n-grams (Γ of the paper) as something that can be read label by label: the history on line, or a table.
+//! Sets of n-grams (Γ of the paper) that are read label by label: the history on line, or a table.
 //!
-//! Reading a sequence of labels ends in a set of *states*. For a history a state is one of its positions: reading goes
-//! to the position before or behind, because the robot may have turned back anywhere. For a table a state is an n-gram
-//! in one of its two directions, the second half of the states being the first half reversed.
+//! Reading a sequence of labels ends in a set of *states*. For a history a state is a position: the next label is read at the
+//! position before or behind, because the robot may turn back anywhere. For a table a state is an n-gram in one of its two
+//! directions; the second half of the states is the first half reversed.
 
 use super::state_set::StateSet;
 use crate::{History, NgramLength, NgramTable};
 
-/// A set of n-grams that a map can be held against: a [`History`] or an [`NgramTable`].
+/// A set of n-grams to compare a map with: a [`History`] or an [`NgramTable`].
 pub trait Evidence<const WORDS: usize>: Readable<WORDS> {}
 
 impl<const WORDS: usize> Evidence<WORDS> for History<WORDS> {}
 impl<const WORDS: usize> Evidence<WORDS> for NgramTable<WORDS> {}
 
-/// What the consistency measure asks of a set of n-grams.
+/// The operations of the consistency measure on a set of n-grams.
 pub trait Readable<const WORDS: usize> {
-    /// How many labels tell all of the set when they are read in one direction: `n`, or less for a shorter history;
-    /// 0 when the set is empty.
+    /// The number of labels of a straight reading, which goes in one direction: `n`, or less for a shorter history; 0 for an empty
+    /// set.
     fn straight_labels(&self, length: NgramLength) -> u8;
 
     /// The states whose label number `index` lies within the range of steps, both ends included.
     fn reading(&self, length: NgramLength, index: u8, range_steps: (u16, u16)) -> StateSet<WORDS>;
 
-    /// The states that a reading may get to by one more label, in either direction.
+    /// The states that a reading can reach with one more label, in either direction.
     fn around(&self, states: &StateSet<WORDS>) -> StateSet<WORDS>;
 
-    /// The states that a reading gets to by one more label without turning back.
+    /// The states that a straight reading reaches with one more label.
     fn onward(&self, states: &StateSet<WORDS>) -> StateSet<WORDS>;
 
     /// The states at which the straight readings of the whole set end.
@@ -51,12 +51,12 @@ impl<const WORDS: usize> Readable<WORDS> for History<WORDS> {
     }
 
     fn reading(&self, _: NgramLength, _: u8, range_steps: (u16, u16)) -> StateSet<WORDS> {
-        let mut held = self.len();
+        let mut left = self.len();
         StateSet::from_words(self.slots().iter().map(|slots| {
             let word =
                 slots.iter().rev().fold(0, |word, label| word << 1 | u32::from(within(label.steps(), range_steps)));
-            let valid = if held >= 32 { u32::MAX } else { (1 << held) - 1 };
-            held = held.saturating_sub(32);
+            let valid = if left >= 32 { u32::MAX } else { (1 << left) - 1 };
+            left = left.saturating_sub(32);
             word & valid
         }))
     }

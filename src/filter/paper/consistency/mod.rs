@@ -1,9 +1,8 @@
-//! How consistent a map is with a set of n-grams: the Hausdorff distance of Eq. 2 and 3, exactly and in integers,
-//! without enumerating the walks of the map.
+//! The consistency of a map with a set of n-grams: the Hausdorff distance of Eq. 2 and 3, exact and in integers, without
+//! enumeration of the walks of the map.
 //!
-//! The distance is the smallest threshold at which two questions are both answered with yes: does the map explain every
-//! n-gram of the evidence (`explained`), and does the evidence confirm every walk of the map (`confirmed`)? Both are
-//! monotone in the threshold, so a search over integers finds it.
+//! The distance is the smallest threshold at which the map explains every n-gram of the evidence (`explained`) and the evidence
+//! confirms every walk of the map (`confirmed`). Both are monotone in the threshold, so a search over integers finds it.
 
 mod confirmed;
 mod evidence;
@@ -20,18 +19,18 @@ use readings::Readings;
 use state_set::StateSet;
 use witness::Witnesses;
 
-/// Which half of Eq. 2 is taken.
+/// Which half of Eq. 2 counts.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Direction {
     /// The larger of the two directed distances: Eq. 2 as printed.
     TwoSided,
-    /// From the walks of the map to the evidence: what is not mapped yet costs nothing.
+    /// From the walks of the map to the evidence: evidence that is not on the map does not count.
     MapToHistory,
-    /// From the evidence to the walks of the map: what the map holds beyond the evidence costs nothing.
+    /// From the evidence to the walks of the map: walks without evidence do not count.
     HistoryToMap,
 }
 
-/// The scratch memory of the consistency measure for maps of `V` vertices and evidence of `WORDS` words.
+/// The memory of the consistency measure for maps of `V` vertices and evidence of `WORDS` words.
 ///
 /// `INDICES` is 1 for a [`History`](crate::History), whose labels read the same at every index of an n-gram, and 7 for
 /// an [`NgramTable`](crate::NgramTable). Memory: about `4 · (2 · INDICES + 9) · V · (WORDS + 1) + 56 · WORDS` bytes.
@@ -57,14 +56,14 @@ pub enum Direction {
 #[derive(Clone, Debug)]
 pub struct Consistency<const V: usize, const WORDS: usize, const INDICES: usize> {
     readings: Readings<V, WORDS, INDICES>,
-    /// Where straight readings of the evidence have got to at each vertex; two rows, used in turn.
+    /// The states that straight readings of the evidence reach at each vertex; two generations, used in turn.
     reached: [PerVertex<StateSet<WORDS>, V>; 2],
     arms: confirmed::Arms<V, WORDS>,
     witnesses: Witnesses,
 }
 
 impl<const V: usize, const WORDS: usize, const INDICES: usize> Consistency<V, WORDS, INDICES> {
-    /// Scratch memory that holds nothing yet.
+    /// Memory that is empty.
     pub const fn new() -> Self {
         Self {
             readings: Readings::new(),
@@ -74,9 +73,9 @@ impl<const V: usize, const WORDS: usize, const INDICES: usize> Consistency<V, WO
         }
     }
 
-    /// The distance of Eq. 2, or one directed half of it, in units of [`NgramLength::label_step_mm`].
+    /// The distance of **Eq. 2**, or one directed half of it, in units of [`NgramLength::label_step_mm`].
     ///
-    /// The maximum over an empty set is 0 and the minimum is infinite, for which `None` stands.
+    /// `None` stands for an infinite distance: the minimum over an empty set. The maximum over an empty set is 0.
     /// Cost: O(log(range) · V · Δⁿᐟ² · WORDS) for a largest degree of Δ in the sparse maps of buildings.
     pub fn distance_steps(
         &mut self,
@@ -90,9 +89,8 @@ impl<const V: usize, const WORDS: usize, const INDICES: usize> Consistency<V, WO
         self.search(map, evidence, length, direction, (0, largest))
     }
 
-    /// The distance, if it is not above a limit; it is known to be no smaller than `known`, and the search starts there.
-    /// Readings are kept from call to call, so the evidence must be the same, or [`Consistency::forget`] be called
-    /// between.
+    /// The distance if it is not above `limit`. The search starts at `known`, a lower bound. Readings are kept from call to call, so
+    /// call [`Consistency::forget`] when the evidence changes.
     pub(crate) fn search(
         &mut self,
         map: &Map<V>,
@@ -110,7 +108,7 @@ impl<const V: usize, const WORDS: usize, const INDICES: usize> Consistency<V, WO
         }
         let mut refuted = known;
         let mut stride = 1;
-        let mut held = loop {
+        let mut confirmed = loop {
             if refuted >= limit {
                 return None;
             }
@@ -121,11 +119,11 @@ impl<const V: usize, const WORDS: usize, const INDICES: usize> Consistency<V, WO
             refuted = farther;
             stride *= 2;
         };
-        while held - refuted > 1 {
-            let middle = refuted + (held - refuted) / 2;
-            if holds(middle) { held = middle } else { refuted = middle }
+        while confirmed - refuted > 1 {
+            let middle = refuted + (confirmed - refuted) / 2;
+            if holds(middle) { confirmed = middle } else { refuted = middle }
         }
-        Some(held)
+        Some(confirmed)
     }
 
     fn holds(
@@ -145,14 +143,14 @@ impl<const V: usize, const WORDS: usize, const INDICES: usize> Consistency<V, WO
             && (!explained || self.explains(map, evidence, length, distance))
     }
 
-    /// Forgets the readings of the evidence, because it changed.
+    /// Drops the readings of the evidence, because it changes.
     pub(crate) fn forget(&mut self) {
         self.readings.forget();
     }
 }
 
 impl<const V: usize, const WORDS: usize> Consistency<V, WORDS, 1> {
-    /// Brings the readings of a history up to date with its newest observation.
+    /// Updates the readings of a history with its newest observation.
     pub(crate) fn include_newest(&mut self, history: &crate::History<WORDS>, length: NgramLength) {
         self.readings.include_newest(history, length);
     }

@@ -1,25 +1,25 @@
-//! The states at which one label of the evidence agrees with one vertex of the map, kept between questions.
+//! The states at which one label of the evidence agrees with one vertex of the map, kept from one threshold to the next.
 
 use super::{evidence::Evidence, state_set::StateSet};
 use crate::map::PerVertex;
 use crate::{Fingerprint, History, NgramLength, VertexId};
 
-/// What a reading was made for.
+/// The label and the threshold of a reading.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 struct Key {
     label: Fingerprint,
-    /// One more than the distance in units of the n-gram's steps; 0 where nothing was read yet, so that the whole state
-    /// is zero at first and lies in `.bss`.
+    /// One more than the distance in units of the n-gram's steps; 0 where nothing was read yet, so that the initial
+    /// value is zero and in `.bss`.
     above_distance: u16,
 }
 
 const NOTHING: Key = Key { label: Fingerprint::ZERO, above_distance: 0 };
 
-/// How many readings are kept for a vertex and an index: one for each remainder of the distance, because the search asks
-/// about neighbouring distances in turn.
+/// How many readings are kept for a vertex and an index: one for each remainder of the distance, because the search
+/// alternates between neighbouring distances.
 const PLANES: usize = 2;
 
-/// The readings that were made last.
+/// The latest readings.
 #[derive(Clone, Debug)]
 pub(super) struct Readings<const V: usize, const WORDS: usize, const INDICES: usize> {
     sets: [[PerVertex<StateSet<WORDS>, V>; PLANES]; INDICES],

@@ -1,4 +1,4 @@
-//! A set of states of the evidence: one bit for each place where reading a sequence of labels may have got to.
+//! A set of states of the evidence: one bit for each state that the reading of a sequence of labels can reach.
 
 /// A set of up to `32 · WORDS` states.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

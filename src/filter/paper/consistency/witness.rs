@@ -1,4 +1,4 @@
-//! What refuted a distance before mostly refutes it again: walks and n-grams that are asked first.
+//! Walks and n-grams that refuted a distance before. They mostly refute it again, so they are tried first.
 
 use super::{evidence::Evidence, readings::Readings, state_set::StateSet};
 use crate::{Map, NgramLength, VertexId, VertexSet};
@@ -9,8 +9,8 @@ const REMEMBERED: usize = 4;
 /// A walk on a map; the first `n` vertices count.
 pub(super) type Walk = [VertexId; NgramLength::MAX.get() as usize];
 
-/// Walks that no n-gram was near, and n-grams that no walk was near, on maps much like the next one. They decide no
-/// question wrongly: each is looked up in the map and the evidence at hand before it is believed.
+/// Walks that no n-gram was near, and n-grams that no walk was near, on similar maps. The result does not depend on them: each is
+/// checked on the map and the evidence at hand.
 #[derive(Clone, Debug)]
 pub(super) struct Witnesses {
     walks: [Walk; REMEMBERED],
@@ -33,7 +33,7 @@ impl Witnesses {
         remember(&mut self.ends, &mut self.next_end, end);
     }
 
-    /// Whether a remembered walk stands in the map and is farther than `distance` from the evidence.
+    /// Whether a remembered walk is one of the map and is farther than `distance` from the evidence.
     pub(super) fn refute_walks<const V: usize, const WORDS: usize, const INDICES: usize>(
         &self,
         map: &Map<V>,

@@ -7,7 +7,7 @@ pub use table::{NgramTable, NgramsFull};
 use crate::Fingerprint;
 use core::fmt;
 
-/// How many labels an n-gram has: 2 to 7. An odd `n = 2k + 1` tells places apart by their neighbourhood of depth `k`.
+/// How many labels an n-gram has: 2 to 7. An odd `n = 2k + 1` distinguishes places by their neighbourhood of depth `k`.
 ///
 /// An n-gram is one `u64`, so up to `n` = 5 its labels keep all 12 bits of a fingerprint; at 6 they keep 10 (steps of
 /// 8 mm) and at 7 they keep 9 (steps of 16 mm).

@@ -5,13 +5,13 @@ use crate::{Fingerprint, History};
 
 /// A sorted set of at most `16 · WORDS` n-grams: 128 bytes a word.
 ///
-/// The capacity is counted in words because the consistency measure holds one bit for each n-gram and each direction of
-/// travel in a state set of `WORDS` 32-bit words.
+/// The unit of the capacity is a word because the consistency measure computes with sets of n-grams, one bit for each n-gram and
+/// direction of travel, in 32-bit words.
 ///
 /// ```
 /// use toposlam::{Fingerprint, History, NgramLength, NgramTable};
 ///
-/// // A corridor from 800 mm to 1200 mm to 1500 mm: the robot may have gone on or turned back anywhere.
+/// // A corridor from 800 mm to 1200 mm to 1500 mm: the robot may drive on or turn back anywhere.
 /// let mut history = History::<1>::new();
 /// let mut grams = NgramTable::<2>::new(NgramLength::new(3)?);
 /// for radius_mm in [800, 1200, 1500] {
@@ -30,7 +30,7 @@ pub struct NgramTable<const WORDS: usize> {
 }
 
 impl<const WORDS: usize> NgramTable<WORDS> {
-    /// How many n-grams the table holds.
+    /// The largest number of n-grams.
     pub const CAPACITY: usize = 16 * WORDS;
 
     /// An empty table of n-grams of one length.
@@ -59,31 +59,31 @@ impl<const WORDS: usize> NgramTable<WORDS> {
         self.ngrams.as_flattened().get(..self.len()).unwrap_or(&[])
     }
 
-    /// Adds an n-gram of the table's length; says whether it is new. Cost: O(capacity).
+    /// Adds an n-gram of the table's length; returns whether it is new. Cost: O(capacity).
     ///
     /// # Errors
-    /// [`NgramsFull`] when there is no room for it; the table stays as it is.
+    /// [`NgramsFull`] if there is no room for it; the table does not change then.
     pub fn insert(&mut self, ngram: Ngram) -> Result<bool, NgramsFull> {
         let Err(place) = self.ngrams().binary_search(&ngram) else { return Ok(false) };
         if self.len() >= Self::CAPACITY {
             return Err(NgramsFull);
         }
         let behind = self.len() - place;
-        let mut carried = ngram;
+        let mut next = ngram;
         for slot in self.ngrams.as_flattened_mut().iter_mut().skip(place).take(behind + 1) {
-            core::mem::swap(slot, &mut carried);
+            core::mem::swap(slot, &mut next);
         }
         self.count += 1;
         Ok(true)
     }
 
-    /// Adds what the newest observation of a history brings: the label strings of all walks of `n` steps to and fro on
-    /// the line of the history (the robot may turn back anywhere) that reach the newest observation. Called after
+    /// Adds the n-grams that the newest observation of a history adds: the labels of all walks of `n` places along the history,
+    /// with turns anywhere, that reach the newest observation. Called after
     /// every observation, the table is Grams_H of the whole history (Definition 4). Cost: O(n² · 2ⁿ) plus an insertion
     /// for each new n-gram.
     ///
     /// # Errors
-    /// [`NgramsFull`] when some did not fit; the others were added.
+    /// [`NgramsFull`] if some did not fit; the others were added.
     pub fn extend<const POSITIONS: usize>(&mut self, history: &History<POSITIONS>) -> Result<(), NgramsFull> {
         let labels = self.length.get();
         let mut result = Ok(());
