@@ -10,7 +10,7 @@ pub use vertex_set::VertexSet;
 
 pub(crate) use vertex_set::VertexSet32;
 
-use crate::Fingerprint;
+use crate::place::Fingerprint;
 
 /// The label of a vertex: the running mean of the fingerprints observed there, kept as sum and count so that it never
 /// drifts.

@@ -16,6 +16,9 @@ macro_rules! vertex_set {
             /// The set without any vertex.
             pub const EMPTY: Self = Self(0);
 
+            /// Every vertex that a set can hold.
+            pub const ALL: Self = Self(<$word>::MAX);
+
             /// The set whose vertices are the numbers of the bits that are set.
             pub const fn from_bits(bits: $word) -> Self {
                 Self(bits)

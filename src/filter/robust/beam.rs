@@ -264,7 +264,8 @@ fn copy<H: Clone>(slots: &mut [H], from: usize, to: usize) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{Fingerprint, Observation, RobustConfig};
+    use crate::filter::{Observation, RobustConfig};
+    use crate::place::Fingerprint;
     use std::collections::BTreeSet;
 
     const WANTED: usize = 6;

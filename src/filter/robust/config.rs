@@ -1,6 +1,6 @@
 //! The parameters of the robust filter.
 
-use crate::ConfigError;
+use crate::config_error::ConfigError;
 use crate::setters::setters;
 
 /// The parameters of the robust filter. The defaults were chosen on random families of environments (docs/evaluation.md).

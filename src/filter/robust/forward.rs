@@ -1,13 +1,13 @@
 //! The forward pass over all paths of a map: the distribution of the newest vertex, and the bound of the map's other paths.
 
+use super::column::{Column, PerSlot, Slot, State, WIDTH};
 use super::history::ObservationHistory;
 use super::hmm::{Emissions, Hmm};
 use super::hypothesis::Hypothesis;
-use super::lattice::{Cells, Column, Lattice, PerSlot, Semiring, Slot, Stage, State, WIDTH};
+use super::lattice::{Cells, Lattice, Semiring, Stage};
 use super::model::{Model, OTHER_PATHS_SHARE};
-use super::proposals::ALL;
-use crate::Turn;
-use crate::map::{PerVertex, VertexId};
+use crate::filter::Turn;
+use crate::map::{PerVertex, VertexId, VertexSet32};
 
 /// The product of the normalisers is turned into a logarithm below this.
 const SMALL: f32 = 1e-12;
@@ -70,7 +70,9 @@ impl<const V: usize> Forward<V> {
             before: None,
             earlier: None,
         };
-        let Some((column, cells, _)) = lattice.walk(&mut sum, (model, history, hmm), ALL, hypothesis.before) else {
+        let Some((column, cells, _)) =
+            lattice.walk(&mut sum, (model, history, hmm), VertexSet32::ALL, hypothesis.before)
+        else {
             return 0.0;
         };
         self.belief.fill(0.0);

@@ -1,6 +1,7 @@
 //! The history: the newest observations, packed. Every hypothesis explains all of them.
 
-use crate::{Fingerprint, Observation, Turn};
+use crate::filter::{Observation, Turn};
+use crate::place::Fingerprint;
 
 /// The largest degree; a larger one counts as this.
 pub(crate) const DEGREE_MAX: u8 = 7;

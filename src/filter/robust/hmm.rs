@@ -1,8 +1,8 @@
 //! A hypothesis as a hidden Markov model: the emission of each vertex and the transitions between vertices.
 
+use super::column::Column;
 use super::history::{ObservationHistory, PackedObservation};
 use super::hypothesis::Hypothesis;
-use super::lattice::Column;
 use super::model::{Model, SHAPE};
 use super::special_functions::digamma;
 use crate::map::{PerVertex, VertexId, VertexSet32};

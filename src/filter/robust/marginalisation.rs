@@ -4,7 +4,7 @@ use super::history::ObservationHistory;
 use super::hypothesis::{Hypothesis, join};
 use super::model::Model;
 use super::statistics::VertexStatistics;
-use crate::Map;
+use crate::map::Map;
 use crate::map::VertexSet32;
 
 impl<const V: usize, const T: usize> Hypothesis<V, T> {

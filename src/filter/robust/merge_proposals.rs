@@ -1,7 +1,7 @@
 //! Proposals that merge vertices.
 
 use super::hypothesis::Hypothesis;
-use super::proposals::{ALL, Proposals};
+use super::proposals::Proposals;
 use crate::map::{PerVertex, VertexId, VertexSet32};
 
 /// The scale of label differences between vertices that are merged, in steps.
@@ -109,7 +109,7 @@ impl<const V: usize, const T: usize> Proposals<'_, V, T> {
         if are_neighbours {
             // The path stays at the vertex now, so it has to be decoded.
             hypothesis.unite_statistics(kept, removed);
-            self.decode(hypothesis, ALL - VertexSet32::from(removed), false);
+            self.decode(hypothesis, VertexSet32::ALL - VertexSet32::from(removed), false);
         }
         true
     }

@@ -16,6 +16,7 @@
 //! | `vertex_ids`, `publish`, `worst_ngram` | what is published |
 
 pub(crate) mod beam;
+mod column;
 mod config;
 mod forward;
 mod growth;
@@ -43,8 +44,12 @@ pub(crate) mod worst_ngram;
 pub use config::RobustConfig;
 
 use super::{Filter, FilterCapacities, Update, WorstNgram, draws};
+use crate::config_error::ConfigError;
+use crate::fault::FaultCounters;
+use crate::filter::Observation;
 use crate::map::PerVertex;
-use crate::{ConfigError, FaultCounters, Fingerprint, Map, Observation, VertexId};
+use crate::map::{Map, VertexId};
+use crate::place::Fingerprint;
 use beam::Beam;
 use forward::Forward;
 use history::ObservationHistory;

@@ -5,7 +5,8 @@ use super::config::RobustConfig;
 use super::history::DEGREE_MAX;
 use super::special_functions::{HALF_LN_2_PI, ln_gamma};
 use super::statistics::VertexStatistics;
-use crate::{Fingerprint, Turn};
+use crate::filter::Turn;
+use crate::place::Fingerprint;
 
 /// R: the range of labels over which the mean of a vertex is uniform a priori, in steps (2 m).
 const LABEL_RANGE_STEPS: f32 = 1000.0;

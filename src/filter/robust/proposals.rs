@@ -59,7 +59,7 @@ impl<const V: usize, const T: usize> Proposals<'_, V, T> {
             6 if vertices < V => self.split_by_label(hypothesis),
             7 | 8 if vertices < V => self.unfold(hypothesis),
             _ => {
-                self.decode(hypothesis, ALL, true);
+                self.decode(hypothesis, VertexSet32::ALL, true);
                 true
             }
         };
@@ -85,7 +85,7 @@ impl<const V: usize, const T: usize> Proposals<'_, V, T> {
         let removed = self.vertex(hypothesis);
         let is_recent = hypothesis.is_recent(removed);
         if is_recent {
-            self.decode(hypothesis, ALL - VertexSet32::from(removed), false);
+            self.decode(hypothesis, VertexSet32::ALL - VertexSet32::from(removed), false);
         }
         is_recent
     }
@@ -95,7 +95,7 @@ impl<const V: usize, const T: usize> Proposals<'_, V, T> {
         // All else follows from the path.
         let before = hypothesis.evidence;
         let path = hypothesis.path;
-        self.decode(hypothesis, ALL, false);
+        self.decode(hypothesis, VertexSet32::ALL, false);
         hypothesis.rebuild(self.model, self.history);
         if hypothesis.evidence > before {
             return true;
@@ -112,6 +112,3 @@ impl<const V: usize, const T: usize> Proposals<'_, V, T> {
         self.viterbi.decode(self.lattice, (self.model, self.history, self.hmm), allowed, noise, hypothesis);
     }
 }
-
-/// All vertices.
-pub(super) const ALL: VertexSet32 = VertexSet32::first(32);

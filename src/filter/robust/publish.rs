@@ -2,7 +2,8 @@
 
 use super::{RobustFilter, worst_ngram};
 use crate::filter::{RobustFactors, Update, WeightFactors};
-use crate::{Fingerprint, VertexId};
+use crate::map::VertexId;
+use crate::place::Fingerprint;
 
 /// 1 in the unit of probabilities.
 const ONE_Q16: f32 = 65536.0;

@@ -1,7 +1,7 @@
 //! The sufficient statistics of a vertex.
 
 use super::history::{DEGREE_MAX, PackedObservation};
-use crate::Fingerprint;
+use crate::place::Fingerprint;
 
 /// Marginalised statistics of this many visits decay by half, so that the map forgets what changed long ago.
 pub(crate) const DECAY_VISITS: u16 = 512;
@@ -91,7 +91,7 @@ impl VertexStatistics {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::Observation;
+    use crate::filter::Observation;
 
     fn statistics(visits: impl IntoIterator<Item = (u16, u8)>) -> VertexStatistics {
         let mut statistics = VertexStatistics::NONE;

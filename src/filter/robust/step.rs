@@ -1,8 +1,10 @@
 //! One more place: the steps from an observation to the published map.
 
 use super::{RobustFilter, noise};
+use crate::fault::FaultKind;
+use crate::filter::Observation;
 use crate::filter::{Filter, Update};
-use crate::{FaultKind, Fingerprint, Observation};
+use crate::place::Fingerprint;
 
 /// The noise is estimated from this place on.
 const NOISE_FROM: u32 = 10;

@@ -1,7 +1,7 @@
 //! For tests and evaluations alone: a search that starts at a given path.
 
 use super::RobustFilter;
-use crate::VertexId;
+use crate::map::VertexId;
 
 impl<const N: usize, const V: usize, const HISTORY: usize> RobustFilter<N, V, HISTORY> {
     /// Replaces all hypotheses by one, given the vertex of each place of the history, the oldest first, numbered from 0 without

@@ -2,7 +2,7 @@
 
 use super::history::ObservationHistory;
 use super::hypothesis::Hypothesis;
-use crate::Map;
+use crate::map::Map;
 use crate::map::{PerVertex, VertexId, VertexSet};
 use core::cmp::Reverse;
 

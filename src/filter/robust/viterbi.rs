@@ -1,11 +1,12 @@
 //! The best path of the history through the map of a hypothesis: the Viterbi algorithm over pairs of successive vertices.
 
+use super::column::{Column, PerSlot, Slot, State, WIDTH};
 use super::history::ObservationHistory;
 use super::hmm::Hmm;
 use super::hypothesis::{Hypothesis, ln};
-use super::lattice::{Cells, Column, Lattice, PerSlot, Semiring, Slot, Stage, State, WIDTH};
+use super::lattice::{Cells, Lattice, Semiring, Stage};
 use super::model::{Model, NEW_EDGE_COST};
-use crate::Turn;
+use crate::filter::Turn;
 use crate::map::{VertexId, VertexSet32};
 use rand_core::Rng;
 use rand_xoshiro::Xoshiro128PlusPlus;

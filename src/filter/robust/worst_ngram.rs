@@ -6,7 +6,8 @@
 use super::history::ObservationHistory;
 use crate::filter::WorstNgram;
 use crate::map::PerVertex;
-use crate::{Fingerprint, Map, VertexId};
+use crate::map::{Map, VertexId};
+use crate::place::Fingerprint;
 
 /// n: how many labels an n-gram has, as in Section IV of the paper.
 pub(crate) const LENGTH: usize = 5;
