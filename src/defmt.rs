@@ -4,13 +4,16 @@
 
 use defmt::{Format, Formatter, write};
 
+use crate::config_error::ConfigError;
+use crate::fault::{FaultCounters, FaultKind};
+use crate::filter::{
+    NgramError, NgramsFull, Observation, PaperFactors, RobustFactors, Turn, Update, WeightFactors, WorstNgram,
+};
+use crate::map::{VertexId, VerticesFull};
 use crate::place::Place;
+use crate::place::{Fingerprint, FingerprintError};
 use crate::ring::Echo;
 use crate::ring::drivers::{AddressError, BridgeError, SonarError, SonarFault};
-use crate::{
-    ConfigError, FaultCounters, FaultKind, Fingerprint, FingerprintError, NgramError, NgramsFull, Observation,
-    PaperFactors, RobustFactors, Turn, Update, VertexId, VerticesFull, WeightFactors, WorstNgram,
-};
 
 /// A text for each variant of an enum without fields.
 macro_rules! texts {

@@ -1,9 +1,12 @@
 //! From ring frames to a map: ring frame → place → hypotheses → map update.
 
+use crate::config_error::ConfigError;
+use crate::fault::FaultCounters;
+use crate::filter::{Filter, Observation, RobustConfig, Turn, Update};
+use crate::map::Map;
 use crate::place::{Place, PlaceConfig, PlaceDetector};
 use crate::ring::{RingFrame, RingGeometry};
 use crate::setters::setters;
-use crate::{ConfigError, FaultCounters, Filter, Map, Observation, RobustConfig, Turn, Update};
 
 /// The most refinement steps between two places. Later steps rarely improve the map, and a robot may stand for days.
 const REFINEMENT_STEPS: u16 = 64;

@@ -14,12 +14,13 @@
 //! # Ok::<(), toposlam::ConfigError>(())
 //! ```
 
+use crate::filter::{Direction, PaperConfig, PaperFilter, RobustConfig, RobustFilter};
+use crate::mapper::{Mapper, MapperConfig};
+use crate::place::PlaceConfig;
+use crate::place::PlaceDetector;
+use crate::ring::RingGeometry;
 #[cfg(feature = "wire")]
 use crate::robot::{Robot, RobotConfig};
-use crate::{
-    Direction, Mapper, MapperConfig, PaperConfig, PaperFilter, RobustConfig, RobustFilter, place::PlaceConfig,
-    place::PlaceDetector, ring::RingGeometry,
-};
 
 /// The number of sensors in the ring.
 pub const SONARS: usize = 16;

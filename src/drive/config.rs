@@ -1,6 +1,6 @@
 //! Settings of the drive, checked once at the start.
 
-use crate::ConfigError;
+use crate::config_error::ConfigError;
 use crate::setters::setters;
 
 /// Settings of the motion along the Voronoi graph.

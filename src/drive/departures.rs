@@ -1,8 +1,9 @@
 //! The exit taken at each place of the history, and from these the vertex behind each exit of the present place.
 
 use super::local_planner::Exits;
+use crate::filter::Filter;
 use crate::map::PerVertex;
-use crate::{Filter, VertexId};
+use crate::map::VertexId;
 
 /// Maximum number of exits of a place that a departure represents.
 pub(super) const MAX_EXITS: usize = 7;

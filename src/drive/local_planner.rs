@@ -4,9 +4,11 @@ use super::rotation::RotationEstimate;
 use super::voronoi::{Sector, edge_heading_mrad, meet_point_offset_mm};
 use super::{DriveConfig, VelocityCommand};
 use crate::bearing::{HALF_TURN_MRAD, rotated, turn_mrad};
+use crate::config_error::ConfigError;
+use crate::fault::{FaultCounters, FaultKind};
+use crate::filter::Turn;
 use crate::place::{Obstacle, Obstacles, Openings, RingScan};
 use crate::ring::Echo;
-use crate::{ConfigError, FaultCounters, FaultKind, Turn};
 
 /// An opening is matched to the one of the frame before when its bearing changed by at most this, in milliradians.
 const SAME_OPENING_MRAD: u16 = 700;

@@ -37,8 +37,11 @@ pub use wheels::{DifferentialDrive, MotorError, Wheel, WheelSpeeds, WheelsConfig
 #[cfg(feature = "snapshot")]
 pub(crate) use departures::is_departure;
 
+use crate::config_error::ConfigError;
+use crate::fault::FaultCounters;
+use crate::filter::{Filter, Turn};
+use crate::map::VertexId;
 use crate::place::{Place, PlaceDetector};
-use crate::{ConfigError, FaultCounters, Filter, Turn, VertexId};
 use local_planner::LocalPlanner;
 use route_planner::RoutePlanner;
 

@@ -4,9 +4,10 @@ use rand_core::Rng;
 
 use super::departures::{Departures, Exit, MAX_EXITS};
 use super::local_planner::Exits;
+use crate::filter::Filter;
 use crate::filter::draws;
 use crate::map::PerVertex;
-use crate::{Filter, VertexId, VertexSet};
+use crate::map::{VertexId, VertexSet};
 
 /// Minimum probability of a vertex that counts as reached, in units of 2⁻¹⁶.
 const REACHED_Q16: u32 = 1 << 15;

@@ -6,7 +6,7 @@ use core::fmt;
 use embedded_hal::{digital::OutputPin, pwm::SetDutyCycle};
 
 use super::VelocityCommand;
-use crate::ConfigError;
+use crate::config_error::ConfigError;
 
 /// Settings of a robot with two driven wheels.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -1,7 +1,10 @@
 //! The interface of a filter.
 
 use super::{Update, WorstNgram};
-use crate::{ConfigError, FaultCounters, Map, Observation, VertexId};
+use crate::config_error::ConfigError;
+use crate::fault::FaultCounters;
+use crate::filter::Observation;
+use crate::map::{Map, VertexId};
 
 /// The capacities of a filter with a configuration.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -77,7 +80,8 @@ pub trait Filter<const V: usize>: Sized {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{Fingerprint, PaperConfig, PaperFilter, RobustConfig, RobustFilter};
+    use crate::filter::{PaperConfig, PaperFilter, RobustConfig, RobustFilter};
+    use crate::place::Fingerprint;
 
     /// A filter after places of some radii. Places of 1.2 m and 2.2 m are far apart.
     fn after<F: Filter<4>>(config: F::Config, radii_mm: &[u16]) -> F {

@@ -13,7 +13,7 @@ pub use paper::{
 };
 pub use robust::{RobustConfig, RobustFilter};
 
-use crate::VertexId;
+use crate::map::VertexId;
 use rand_core::SeedableRng;
 use rand_xoshiro::Xoshiro128PlusPlus;
 

@@ -1,6 +1,6 @@
 //! An observation: the fingerprint of a place, and two optional hints that need no odometry.
 
-use crate::Fingerprint;
+use crate::place::Fingerprint;
 
 /// How the robot left the place before: whether it drove back along the edge by which it had come.
 ///

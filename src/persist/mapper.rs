@@ -2,7 +2,8 @@
 
 use super::Persist;
 use super::snapshot::{Resume, Snapshot, SnapshotError, Writer};
-use crate::{Filter, Mapper};
+use crate::filter::Filter;
+use crate::mapper::Mapper;
 
 impl<const SONARS: usize, const V: usize, F: Filter<V> + Persist> Mapper<SONARS, V, F> {
     /// Writes a snapshot of the mapper alone and returns its length in bytes.

@@ -1,6 +1,6 @@
 //! Settings of the place detector, checked once at the start.
 
-use crate::ConfigError;
+use crate::config_error::ConfigError;
 use crate::ring::RingGeometry;
 use crate::setters::setters;
 

@@ -3,9 +3,10 @@
 use super::scan::{MeetPoint, RingScan};
 use super::smoothing::{DEAD_MM, RangeSmoother, SILENT_MM, bridge_dead_sensors};
 use super::{Fingerprint, PlaceConfig};
+use crate::config_error::ConfigError;
+use crate::fault::{FaultCounters, FaultKind};
 use crate::ring::{Echo, RingFrame, RingGeometry};
 use crate::top_k::TopK;
-use crate::{ConfigError, FaultCounters, FaultKind};
 
 /// The radius is the mean over at most this many frames.
 const AVERAGED_FRAMES: usize = 8;

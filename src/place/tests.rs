@@ -1,8 +1,9 @@
 //! The place detector on synthetic frames: a corridor 2 m wide and its end.
 
 use super::*;
+use crate::config_error::ConfigError;
+use crate::fault::{FaultCounters, FaultKind};
 use crate::ring::{Echo, RingFrame, RingGeometry};
-use crate::{ConfigError, FaultCounters, FaultKind};
 
 /// An even ring and its frame in a corridor 2 m wide, with the end wall `end_mm` straight ahead. Each sensor measures along
 /// its axis.

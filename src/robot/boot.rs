@@ -3,7 +3,7 @@
 use embedded_storage::nor_flash::NorFlash;
 
 use super::{Robot, RobotConfig};
-use crate::ConfigError;
+use crate::config_error::ConfigError;
 use crate::persist::store::{BootPolicy, BootReport, Store, resume};
 use crate::wire::Staging;
 

@@ -2,9 +2,11 @@
 
 use super::{Board, FRAMES_PER_HELLO, Line, RECEIVED_PER_TURN, Robot, restore, snapshot};
 use crate::drive::{self, Goal};
+use crate::fault::FaultKind;
+use crate::filter::RobustFilter;
+use crate::map::VertexId;
 use crate::persist::snapshot::Resume;
 use crate::wire::{Command, GoalState, GoalStatus, Info, Message, Outcome, Refusal, Setting, Settings, Version};
-use crate::{FaultKind, RobustFilter, VertexId};
 
 /// No goal status was sent.
 pub(super) const NO_GOAL: (Goal, drive::GoalStatus) = (Goal::Explore, drive::GoalStatus::Inactive);

@@ -1,11 +1,12 @@
 //! The settings of a robot: those of its stages and of its main loop.
 
 use crate::drive::DriveConfig;
+use crate::filter::{Filter, RobustConfig};
+use crate::mapper::MapperConfig;
 use crate::persist::snapshot::SnapshotPolicy;
 use crate::ring::RingGeometry;
 use crate::setters::setters;
 use crate::wire::{Capacities, Hello, ResetCause};
-use crate::{Filter, MapperConfig, RobustConfig};
 
 /// The settings of a robot.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -56,13 +56,16 @@ mod config;
 pub use board::{Board, SaveError};
 pub use config::RobotConfig;
 
+use crate::config_error::ConfigError;
 use crate::drive::{Drive, Goal, GoalStatus, VelocityCommand};
+use crate::fault::{FaultCounters, FaultKind};
+use crate::filter::{RobustFilter, Update};
+use crate::mapper::Mapper;
 use crate::persist::Persist;
 use crate::persist::snapshot::{Resume, Snapshot, SnapshotError, SnapshotPolicy, Writer};
 use crate::place::Place;
 use crate::ring::RingFrame;
 use crate::wire::{self, Echoes, Encoder, Health, Inbox, MAX_FRAME_BYTES, Message, QueueFull, Reporter, Staging};
-use crate::{ConfigError, FaultCounters, FaultKind, Mapper, RobustFilter, Update};
 
 /// How often the robot sends a `Hello`, in ring frames.
 const FRAMES_PER_HELLO: u16 = 100;

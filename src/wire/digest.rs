@@ -2,7 +2,7 @@
 
 use super::Row;
 use crate::checksum::CRC;
-use crate::{Map, VertexId};
+use crate::map::{Map, VertexId};
 
 /// CRC-32 ISO-HDLC of some bytes.
 pub fn crc32(bytes: &[u8]) -> u32 {
@@ -43,7 +43,7 @@ pub(super) fn row_of<const V: usize>(map: &Map<V>, vertex: VertexId) -> Row {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::Fingerprint;
+    use crate::place::Fingerprint;
 
     #[test]
     fn the_crc_is_the_one_of_zlib() {

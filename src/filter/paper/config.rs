@@ -1,7 +1,8 @@
 //! The parameters of the paper's filter.
 
+use crate::config_error::ConfigError;
+use crate::filter::{Direction, NgramLength};
 use crate::setters::setters;
-use crate::{ConfigError, Direction, NgramLength};
 
 /// The parameters of the paper's filter. The defaults are the paper's where it gives them.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

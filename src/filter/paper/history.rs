@@ -1,6 +1,6 @@
 //! The history of the robot: the fingerprints of the places it visited, in order (H of the paper).
 
-use crate::Fingerprint;
+use crate::place::Fingerprint;
 
 /// The newest `32 · WORDS` fingerprints, a ring in fixed memory: 64 bytes a word.
 ///

@@ -2,7 +2,8 @@
 //!
 //! A log weight is an `i32` in units of 2⁻¹⁶ nats, so that sums are exact, incremental and the same on every target.
 
-use crate::{Fingerprint, PaperConfig};
+use crate::filter::PaperConfig;
+use crate::place::Fingerprint;
 
 /// One nat in the unit of log weights.
 pub(crate) const NAT: i32 = 1 << 16;

@@ -21,7 +21,11 @@ pub use particle::Particle;
 pub use prior::Prior;
 
 use super::{Filter, FilterCapacities, Update, WeightFactors, WorstNgram, draws};
-use crate::{ConfigError, FaultCounters, FaultKind, Fingerprint, Map, Observation, VertexId};
+use crate::config_error::ConfigError;
+use crate::fault::{FaultCounters, FaultKind};
+use crate::filter::Observation;
+use crate::map::{Map, VertexId};
+use crate::place::Fingerprint;
 use particles::{Particles, Step};
 use rand_core::Rng;
 

@@ -1,7 +1,8 @@
 //! One particle: a map, the vertex of the robot, and the weight (Section III.A).
 
 use crate::filter::PaperFactors;
-use crate::{Fingerprint, Map, VertexId};
+use crate::map::{Map, VertexId};
+use crate::place::Fingerprint;
 
 /// One hypothesis: a map and the vertex of the robot.
 #[derive(Clone, Copy, Debug)]

@@ -5,9 +5,11 @@ use super::resample::PROPOSAL_REACH;
 use super::selection::{Candidate, Choice, Selection};
 use crate::filter::paper::consistency::{Consistency, Direction, Evidence};
 use crate::filter::paper::likelihood::Likelihood;
+use crate::filter::{NgramLength, PaperConfig};
+use crate::map::Map;
 use crate::map::PerVertex;
+use crate::place::Fingerprint;
 use crate::top_k::insertion_sort;
-use crate::{Fingerprint, Map, NgramLength, PaperConfig};
 
 /// The result of a step besides the particles.
 pub(super) struct Step {

@@ -1,6 +1,6 @@
 //! The n-grams of an earlier exploration: Γ_env of the paper.
 
-use crate::{Consistency, Ngram, NgramLength, NgramTable, NgramsFull};
+use crate::filter::{Consistency, Ngram, NgramLength, NgramTable, NgramsFull};
 
 /// At most `16 · WORDS` n-grams of an earlier exploration, with the memory to compare them with maps of `V` vertices.
 ///
@@ -37,7 +37,7 @@ impl<const V: usize, const WORDS: usize> Prior<V, WORDS> {
     /// [`NgramsFull`] if some n-grams did not fit; the others were added.
     pub fn extend<const POSITIONS: usize>(
         &mut self,
-        exploration: &crate::History<POSITIONS>,
+        exploration: &crate::filter::History<POSITIONS>,
     ) -> Result<(), NgramsFull> {
         self.consistency.forget();
         self.ngrams.extend(exploration)

@@ -2,11 +2,13 @@
 
 use super::particle::{Particle, predict};
 use super::resample::{DISTANCE_REACH, PROPOSAL_REACH, PROPOSALS, accepts, draw_weight, target};
+use crate::filter::NgramLength;
 use crate::filter::PaperFactors;
 use crate::filter::paper::consistency::{Consistency, Direction, Evidence};
 use crate::filter::paper::likelihood::Likelihood;
 use crate::map::PerVertex;
-use crate::{Fingerprint, Map, NgramLength, VertexId};
+use crate::map::{Map, VertexId};
+use crate::place::Fingerprint;
 
 /// A prediction: the robot of a particle goes to a vertex, which may be a new one behind the last. Ordered as the pool is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]

@@ -1,8 +1,8 @@
 //! For tests alone: the random draws are given.
 
 use super::{PaperFilter, Prior};
-use crate::Fingerprint;
 use crate::filter::Update;
+use crate::place::Fingerprint;
 
 impl<const N: usize, const V: usize, const WORDS: usize> PaperFilter<N, V, WORDS> {
     /// As [`Filter::observe`](crate::Filter::observe), with the random draws given: for each particle in turn, one that proposes

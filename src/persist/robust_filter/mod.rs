@@ -6,11 +6,11 @@
 mod hypothesis;
 mod parts;
 
-use crate::FaultCounters;
+use crate::fault::FaultCounters;
 use crate::filter::robust::worst_ngram;
+use crate::filter::{RobustConfig, RobustFilter};
 use crate::persist::Persist;
 use crate::persist::snapshot::{FILTER_SECTION, FRAME_BYTES, Reader, SnapshotError, Writer};
-use crate::{RobustConfig, RobustFilter};
 use parts::{STATISTICS_BYTES, path_bytes, row_bytes};
 
 /// What the contents of the filter's section begin with.

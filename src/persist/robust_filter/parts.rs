@@ -1,11 +1,12 @@
 //! The parts of a snapshot: observations, statistics, edges, paths, and what was published last.
 
-use crate::RobustFilter;
+use crate::filter::RobustFilter;
 use crate::filter::robust::history::{ObservationHistory, PackedObservation};
 use crate::filter::robust::statistics::{DECAY_VISITS, VertexStatistics};
+use crate::map::{Map, VertexId};
 use crate::map::{PerVertex, VertexSet32};
 use crate::persist::snapshot::{Reader, SnapshotError, Writer};
-use crate::{Fingerprint, Map, VertexId};
+use crate::place::Fingerprint;
 
 /// No vertex.
 pub(super) const NOWHERE: u8 = u8::MAX;

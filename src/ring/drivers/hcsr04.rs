@@ -16,10 +16,9 @@ use super::{
     reading::Readings,
     sound::{check_speed_of_sound, flight_us, range_mm},
 };
-use crate::{
-    ConfigError, FaultCounters,
-    ring::{Echo, RingFrame},
-};
+use crate::config_error::ConfigError;
+use crate::fault::FaultCounters;
+use crate::ring::{Echo, RingFrame};
 
 /// A clock that counts microseconds and wraps after `u32::MAX`, such as a free-running timer.
 pub trait MicrosecondClock {

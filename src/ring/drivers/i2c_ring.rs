@@ -6,7 +6,9 @@ use embedded_hal::{
 };
 
 use super::{FiringPlan, Reading, SonarError, SonarFault, SonarRing, reading::Readings};
-use crate::{ConfigError, FaultCounters, ring::RingFrame};
+use crate::config_error::ConfigError;
+use crate::fault::FaultCounters;
+use crate::ring::RingFrame;
 
 /// A kind of ranger on an I2C bus: one message starts a measurement, another polls for its result.
 ///

@@ -8,7 +8,8 @@ use crate::setters::setters;
 use embedded_hal::i2c::I2c;
 
 use super::{FiringPlan, I2cRanger, I2cRing, RangingTiming, Reading, SonarFault, i2c_ring::check_addresses};
-use crate::{ConfigError, ring::Echo};
+use crate::config_error::ConfigError;
+use crate::ring::Echo;
 
 const START_MEASUREMENT: u8 = 81;
 const MIN_RANGE_CM: u16 = 20;

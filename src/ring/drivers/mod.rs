@@ -63,7 +63,8 @@
 
 use core::fmt;
 
-use crate::{FaultCounters, FaultKind, ring::RingFrame};
+use crate::fault::{FaultCounters, FaultKind};
+use crate::ring::RingFrame;
 
 mod address;
 mod firing;

@@ -1,10 +1,8 @@
 //! The readings of a frame while its groups fire one after the other, for any kind of sensor.
 
 use super::{FiringPlan, SonarError, SonarFault};
-use crate::{
-    FaultCounters,
-    ring::{Echo, RingFrame},
-};
+use crate::fault::FaultCounters;
+use crate::ring::{Echo, RingFrame};
 
 /// The state of one sensor's measurement.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -1,6 +1,6 @@
 //! Time of flight of an ultrasonic pulse to range.
 
-use crate::ConfigError;
+use crate::config_error::ConfigError;
 
 /// Checks that the setting `speed_of_sound_m_per_s` is plausible for air: 331 at 0 °C, 355 at 40 °C.
 pub(super) fn check_speed_of_sound(speed_m_per_s: u16) -> Result<(), ConfigError> {

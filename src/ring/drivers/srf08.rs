@@ -15,7 +15,8 @@ use super::{
     i2c_ring::check_addresses,
     sound::{check_speed_of_sound, range_mm},
 };
-use crate::{ConfigError, ring::Echo};
+use crate::config_error::ConfigError;
+use crate::ring::Echo;
 
 /// All SRF08 on the bus listen to this address.
 const GENERAL_CALL: u8 = 0;

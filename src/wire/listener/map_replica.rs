@@ -1,6 +1,7 @@
 //! A replica of the robot's map, built from its messages.
 
-use crate::{FaultKind, VertexSet};
+use crate::fault::FaultKind;
+use crate::map::VertexSet;
 
 use crate::wire::decoder::{Arrival, Header};
 use crate::wire::digest::rows_digest;

@@ -3,9 +3,10 @@
 use serde::{Deserialize, Serialize};
 
 use super::List;
+use crate::filter::Filter;
+use crate::map::{VertexId, VertexSet};
 use crate::top_k::TopK;
 use crate::wire::robot::bit;
-use crate::{Filter, VertexId, VertexSet};
 
 /// The belief of the filter after a place: where the robot may be, and how probable the map is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]

@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::{Update, WeightFactors};
+use crate::filter::{Update, WeightFactors};
 
 /// The evidence for the best map after a place. Logarithms are natural, in units of 2⁻¹⁶ nats.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]

@@ -6,7 +6,9 @@ use serde::{Deserialize, Serialize};
 
 use super::code::codes;
 use super::{Belief, Echoes, Evidence, GoalStatus, Remapped, Reply, Velocity, Worst};
-use crate::{Filter, FilterCapacities, Fingerprint, MapperConfig, Update};
+use crate::filter::{Filter, FilterCapacities, Update};
+use crate::mapper::MapperConfig;
+use crate::place::Fingerprint;
 
 /// The version of the messages and requests.
 pub const PROTOCOL_VERSION: u16 = 4;

@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use super::Refusal;
-use crate::RobustConfig;
+use crate::filter::RobustConfig;
 use crate::place::PlaceConfig;
 
 /// One setting and its value. Append-only; every value is a `u16`.

@@ -1,8 +1,8 @@
 //! The receiving end of the robot: bytes in, at most one command per turn of the main loop.
 
+use crate::fault::{FaultCounters, FaultKind};
 use crate::wire::decoder::Progress;
 use crate::wire::{Command, Decoder, Outcome, Reply, Request};
-use crate::{FaultCounters, FaultKind};
 
 /// Decodes the bytes of the robot's receive line, and executes at most one command per turn of the main loop.
 ///

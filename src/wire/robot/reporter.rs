@@ -2,10 +2,13 @@
 
 use core::fmt;
 
+use crate::fault::{FaultCounters, FaultKind};
+use crate::filter::{Filter, Update};
+use crate::map::Map;
+use crate::mapper::Mapper;
 use crate::place::Place;
 use crate::wire::digest::{map_digest, row_of};
 use crate::wire::{Belief, Capacities, Evidence, Hello, List, Location, Message, Remapped, ResetCause, Row, Worst};
-use crate::{FaultCounters, FaultKind, Filter, Map, Mapper, Update};
 
 /// Decides which messages to send. It remembers what was sent, and passes each message to a callback, which says whether
 /// the transmit queue took it. It never waits.

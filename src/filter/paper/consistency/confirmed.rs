@@ -5,8 +5,9 @@
 //! a vertex only those with minimal sets of states matter: a set that meets another one meets all supersets of it.
 
 use super::{Consistency, evidence::Evidence, readings::Readings, state_set::StateSet, witness::Walk};
+use crate::filter::NgramLength;
 use crate::map::PerVertex;
-use crate::{Map, NgramLength, VertexId, VertexSet};
+use crate::map::{Map, VertexId, VertexSet};
 
 /// How many arms are compared at once; more are compared in blocks.
 const BLOCK: usize = 14;

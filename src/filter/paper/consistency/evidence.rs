@@ -5,7 +5,7 @@
 //! directions; the second half of the states is the first half reversed.
 
 use super::state_set::StateSet;
-use crate::{History, NgramLength, NgramTable};
+use crate::filter::{History, NgramLength, NgramTable};
 
 /// A set of n-grams to compare a map with: a [`History`] or an [`NgramTable`].
 pub trait Evidence<const WORDS: usize>: Readable<WORDS> {}
@@ -110,8 +110,9 @@ impl<const WORDS: usize> Readable<WORDS> for NgramTable<WORDS> {
         let coarse = (range_steps.0 >> length.coarsening(), range_steps.1 >> length.coarsening());
         let direction = |index: u8| {
             let mut words = self.ngrams().chunks(32).map(move |ngrams| {
-                let label =
-                    |word, ngram: &crate::Ngram| word << 1 | u32::from(within(ngram.label(length, index), coarse));
+                let label = |word, ngram: &crate::filter::Ngram| {
+                    word << 1 | u32::from(within(ngram.label(length, index), coarse))
+                };
                 ngrams.iter().rev().fold(0, label)
             });
             (0..WORDS / 2).map(move |_| words.next().unwrap_or(0))

@@ -1,7 +1,8 @@
 //! From the evidence to the map: is every n-gram of the evidence near some walk of the map?
 
 use super::{Consistency, evidence::Evidence, state_set::StateSet};
-use crate::{Map, NgramLength};
+use crate::filter::NgramLength;
+use crate::map::Map;
 
 impl<const V: usize, const WORDS: usize, const INDICES: usize> Consistency<V, WORDS, INDICES> {
     /// Whether max over the evidence of min over the map's walks of Eq. 3 is at most `distance`.

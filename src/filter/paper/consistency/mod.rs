@@ -13,8 +13,9 @@ mod witness;
 
 pub use evidence::Evidence;
 
+use crate::filter::NgramLength;
+use crate::map::Map;
 use crate::map::PerVertex;
-use crate::{Map, NgramLength};
 use readings::Readings;
 use state_set::StateSet;
 use witness::Witnesses;
@@ -85,7 +86,7 @@ impl<const V: usize, const WORDS: usize, const INDICES: usize> Consistency<V, WO
         direction: Direction,
     ) -> Option<u16> {
         self.readings.forget();
-        let largest = crate::Fingerprint::MAX.steps() >> length.coarsening();
+        let largest = crate::place::Fingerprint::MAX.steps() >> length.coarsening();
         self.search(map, evidence, length, direction, (0, largest))
     }
 
@@ -151,7 +152,7 @@ impl<const V: usize, const WORDS: usize, const INDICES: usize> Consistency<V, WO
 
 impl<const V: usize, const WORDS: usize> Consistency<V, WORDS, 1> {
     /// Updates the readings of a history with its newest observation.
-    pub(crate) fn include_newest(&mut self, history: &crate::History<WORDS>, length: NgramLength) {
+    pub(crate) fn include_newest(&mut self, history: &crate::filter::History<WORDS>, length: NgramLength) {
         self.readings.include_newest(history, length);
     }
 }

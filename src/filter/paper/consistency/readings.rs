@@ -1,8 +1,10 @@
 //! The states at which one label of the evidence agrees with one vertex of the map, kept from one threshold to the next.
 
 use super::{evidence::Evidence, state_set::StateSet};
+use crate::filter::{History, NgramLength};
 use crate::map::PerVertex;
-use crate::{Fingerprint, History, NgramLength, VertexId};
+use crate::map::VertexId;
+use crate::place::Fingerprint;
 
 /// The label and the threshold of a reading.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

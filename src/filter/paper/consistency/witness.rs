@@ -1,7 +1,8 @@
 //! Walks and n-grams that refuted a distance before. They mostly refute it again, so they are tried first.
 
 use super::{evidence::Evidence, readings::Readings, state_set::StateSet};
-use crate::{Map, NgramLength, VertexId, VertexSet};
+use crate::filter::NgramLength;
+use crate::map::{Map, VertexId, VertexSet};
 
 /// How many witnesses of each kind are remembered.
 const REMEMBERED: usize = 4;

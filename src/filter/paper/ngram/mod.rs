@@ -4,7 +4,7 @@ mod table;
 
 pub use table::{NgramTable, NgramsFull};
 
-use crate::Fingerprint;
+use crate::place::Fingerprint;
 use core::fmt;
 
 /// How many labels an n-gram has: 2 to 7. An odd `n = 2k + 1` distinguishes places by their neighbourhood of depth `k`.

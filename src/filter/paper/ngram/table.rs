@@ -1,7 +1,8 @@
 //! A bounded set of n-grams, sorted in fixed memory: Grams_H of the paper, built as the history grows.
 
 use super::{Ngram, NgramLength};
-use crate::{Fingerprint, History};
+use crate::filter::History;
+use crate::place::Fingerprint;
 
 /// A sorted set of at most `16 · WORDS` n-grams: 128 bytes a word.
 ///
