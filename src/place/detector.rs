@@ -6,7 +6,6 @@ use super::{Fingerprint, PlaceConfig};
 use crate::config_error::ConfigError;
 use crate::fault::{FaultCounters, FaultKind};
 use crate::ring::{Echo, RingFrame, RingGeometry};
-use crate::top_k::TopK;
 
 /// The radius is the mean over at most this many frames.
 const AVERAGED_FRAMES: usize = 8;
@@ -39,6 +38,9 @@ struct Sighting {
 
 impl Sighting {
     const UNSET: Self = Self { meet_point: MeetPoint { spread_mm: 0, radius_mm: 0, openings: 0 }, frame_index: 0 };
+    /// Sorts behind every real sighting.
+    const NONE: Self =
+        Self { meet_point: MeetPoint { spread_mm: u16::MAX, radius_mm: 0, openings: 0 }, frame_index: 0 };
 }
 
 /// Detects places in the frames of a ring of `SONARS` sensors.
@@ -66,7 +68,7 @@ pub struct PlaceDetector<const SONARS: usize> {
     /// Frames that contradict the present state minus frames that confirm it, at least 0.
     contrary_frames: u8,
     /// The sightings with the smallest spread, best first.
-    best: TopK<Sighting, AVERAGED_FRAMES>,
+    best: [Sighting; AVERAGED_FRAMES],
     faults: FaultCounters,
 }
 
@@ -85,7 +87,7 @@ impl<const SONARS: usize> PlaceDetector<SONARS> {
             is_at_place: false,
             sightings: 0,
             contrary_frames: 0,
-            best: TopK::new(Sighting::UNSET),
+            best: [Sighting::UNSET; AVERAGED_FRAMES],
             faults: FaultCounters::new(),
         }
     }
@@ -230,7 +232,7 @@ impl<const SONARS: usize> PlaceDetector<SONARS> {
         if sighting.meet_point.spread_mm <= self.config.equidistance_mm {
             self.sightings = self.sightings.saturating_add(1);
             self.contrary_frames = self.contrary_frames.saturating_sub(1);
-            self.best.insert(sighting, |one, other| one.meet_point.spread_mm <= other.meet_point.spread_mm);
+            self.insert(sighting);
         } else if self.sightings > 0 {
             self.contrary_frames = self.contrary_frames.saturating_add(1);
         }
@@ -250,17 +252,27 @@ impl<const SONARS: usize> PlaceDetector<SONARS> {
         place
     }
 
+    /// Inserts a sighting into the best ones, in ascending order of spread. A sighting that is displaced goes behind those of its
+    /// own spread, so the newer ones stay: a stable order, as that of `TopK`, would keep the older ones.
+    fn insert(&mut self, mut sighting: Sighting) {
+        for slot in &mut self.best {
+            if sighting.meet_point.spread_mm < slot.meet_point.spread_mm {
+                core::mem::swap(slot, &mut sighting);
+            }
+        }
+    }
+
     fn forget_sightings(&mut self) {
-        self.best.clear();
+        self.best = [Sighting::NONE; AVERAGED_FRAMES];
         self.sightings = 0;
         self.contrary_frames = 0;
     }
 
     /// The mean of the best sightings.
     fn place(&mut self) -> Option<Place> {
-        let best = *self.best.as_slice().first()?;
+        let [best, ..] = self.best;
         let limit_mm = best.meet_point.spread_mm.saturating_add(AVERAGED_SPREAD_MM);
-        let meet_points = self.best.as_slice().iter().map(|sighting| sighting.meet_point);
+        let meet_points = self.best.iter().map(|sighting| sighting.meet_point);
         let close = meet_points.filter(|meet_point| meet_point.spread_mm <= limit_mm);
         let (count, sum_mm) = close.clone().fold((0u32, 0u32), |(count, sum_mm), meet_point| {
             (count.saturating_add(1), sum_mm.saturating_add(u32::from(meet_point.radius_mm)))

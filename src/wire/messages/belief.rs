@@ -5,7 +5,6 @@ use serde::{Deserialize, Serialize};
 use super::List;
 use crate::filter::Filter;
 use crate::map::{VertexId, VertexSet};
-use crate::top_k::TopK;
 use crate::wire::robot::bit;
 
 /// The belief of the filter after a place: where the robot may be, and how probable the map is.
@@ -31,13 +30,18 @@ pub struct VertexProbability {
 impl Belief {
     /// The belief of a filter after a place. Cost: O(8 · V).
     pub fn of<const V: usize>(filter: &impl Filter<V>, place_index: u32) -> Self {
-        let mut most_probable = TopK::<VertexProbability, 8>::new(VertexProbability::default());
+        let mut most_probable = [VertexProbability::default(); 8];
         for vertex in filter.map().vertices() {
             let permille = permille(filter.vertex_probability_q16(vertex));
-            let candidate = VertexProbability { vertex: vertex.into(), permille };
-            most_probable.insert(candidate, |one, other| one.permille >= other.permille);
+            let mut candidate = VertexProbability { vertex: vertex.into(), permille };
+            // A vertex that is displaced goes behind those of its own probability.
+            for slot in &mut most_probable {
+                if candidate.permille > slot.permille {
+                    core::mem::swap(slot, &mut candidate);
+                }
+            }
         }
-        let vertices = List::new(most_probable.as_slice().iter().copied().filter(|candidate| candidate.permille > 0));
+        let vertices = List::new(most_probable.into_iter().take_while(|candidate| candidate.permille > 0));
         Self { place_index, map_permille: permille(filter.map_probability_q16()), vertices }
     }
 
