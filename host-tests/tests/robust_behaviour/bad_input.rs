@@ -84,6 +84,33 @@ fn a_robot_that_is_kidnapped_before_every_place_has_a_map_without_edges() {
     assert_eq!(watched.filter.map().edges().count(), 0);
 }
 
+#[test]
+fn statistics_of_a_sequence_that_left_the_history_stay_with_their_vertex() {
+    let config =
+        RobustConfig::DEFAULT.with_noise_mm(1).with_moves(3).with_wrong_turn_permille(1).with_wrong_degree_permille(25);
+    // The first place is a sequence of its own, so it leaves the history without an edge.
+    let places = [
+        (402, Some(4), false),
+        (500, Some(6), true),
+        (500, None, false),
+        (500, None, false),
+        (403, Some(6), false),
+        (403, None, false),
+        (404, Some(3), false),
+        (500, None, false),
+        (550, None, false),
+        (502, None, false),
+        (450, None, false),
+        (450, None, false),
+    ];
+    let observation = |&(steps, degree, starts_sequence): &(u16, Option<u8>, bool)| {
+        let fingerprint = Fingerprint::from_steps(steps).unwrap();
+        (Observation { fingerprint, turn: None, degree, starts_sequence }, 0)
+    };
+    let observations: Vec<(Observation, u8)> = places.iter().map(observation).collect();
+    bears::<3, 4>(config, &observations, 4_264_363_679_906_593_650);
+}
+
 /// Anything: labels of a few kinds or of any, hints that contradict each other, sequences of one place.
 fn anything() -> impl Strategy<Value = Observation> {
     let steps =
