@@ -152,23 +152,18 @@ impl<const N: usize, const V: usize, const T: usize> Beam<N, V, T> {
         for &slot in self.order.iter().take(self.len) {
             let Some(parent) = self.slots.get(usize::from(slot)) else { continue };
             let has_other = parent.vertices > 1 || !fixed && parent.vertices > 0;
-            for vertex in parent.vertices() {
+            let new_vertex = if fixed { None } else { Some(None) };
+            for vertex in parent.vertices().map(Some).chain(new_vertex) {
                 // No path stays at a vertex, unless there is no other.
-                if has_other && Some(vertex) == parent.at && !newest.1.starts_sequence() {
+                if has_other && vertex.is_some() && vertex == parent.at && !newest.1.starts_sequence() {
                     continue;
                 }
-                let (gain, key) = if fixed {
-                    parent.localisation_gain(model, history, newest, vertex)
-                } else {
-                    parent.gain(model, history, newest, Some(vertex))
+                let (gain, key) = match vertex {
+                    Some(vertex) if fixed => parent.localisation_gain(model, history, newest, vertex),
+                    _ => parent.gain(model, history, newest, vertex),
                 };
                 let score = parent.score() + gain;
-                insert_distinct(&mut chosen, wanted, Prediction { score, gain, key, parent: slot, vertex });
-            }
-            if !fixed {
-                let (gain, key) = parent.gain(model, history, newest, None);
-                let score = parent.score() + gain;
-                match parent.next_vertex() {
+                match vertex.or(parent.next_vertex()) {
                     Some(vertex) => {
                         insert_distinct(&mut chosen, wanted, Prediction { score, gain, key, parent: slot, vertex });
                     }

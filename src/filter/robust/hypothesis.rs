@@ -124,11 +124,6 @@ impl<const V: usize, const T: usize> Hypothesis<V, T> {
         self.neighbours[a].contains(b)
     }
 
-    /// How many edges the map has.
-    fn edges(&self) -> u32 {
-        self.vertices().map(|vertex| self.degree(vertex)).sum::<u32>() / 2
-    }
-
     /// Follows from a path that was changed: numbers the vertices by first visit, drops those without visits, and computes
     /// statistics, edges and evidence. Cost: O(T + V).
     pub(crate) fn rebuild(&mut self, model: &Model, history: &ObservationHistory<T>) {
@@ -189,15 +184,17 @@ impl<const V: usize, const T: usize> Hypothesis<V, T> {
     pub(crate) fn factors(&self, model: &Model) -> [f32; 3] {
         let mut labels = 0.0;
         let mut transitions = self.ln_hints - f32::from(self.starts) * ln(self.vertices.max(1));
+        let mut degrees = 0;
         for vertex in self.vertices() {
-            let statistics = &self.statistics[vertex];
+            let (statistics, degree) = (&self.statistics[vertex], self.degree(vertex));
             labels += model.label_evidence(statistics);
-            transitions += model.exit_evidence(statistics, self.degree(vertex));
+            transitions += model.exit_evidence(statistics, degree);
+            degrees += degree;
             if self.is_edge(vertex, vertex) {
                 transitions -= SELF_LOOP_COST;
             }
         }
-        [labels, transitions, f32::from(self.vertices) * LN_VERTEX + self.edges() as f32 * LN_EDGE]
+        [labels, transitions, f32::from(self.vertices) * LN_VERTEX + (degrees / 2) as f32 * LN_EDGE]
     }
 
     /// Numbers the vertices in the order of their first visit, and drops those without visits.

@@ -263,6 +263,7 @@ impl<const V: usize> Semiring for BestPath<'_, V> {
 }
 
 /// The best pair of the cells of a column.
+#[inline(never)]
 fn best_pair(column: &Column, cells: &Cells, rows: usize) -> (Slot, Slot, f32) {
     let mut best = (Slot::FIRST, Slot::FIRST, f32::NEG_INFINITY);
     for from in Slot::first(rows) {
