@@ -1,4 +1,4 @@
-//! The path of vertices of every particle, rebuilt from what the filter tells of each step: parent and vertex.
+//! The vertex paths of all particles, rebuilt from the parent and the vertex of each particle at each step.
 
 /// The paths of all particles of the current generation.
 #[derive(Clone, Debug, Default)]
@@ -7,13 +7,13 @@ pub struct Ancestry {
 }
 
 impl Ancestry {
-    /// No step yet.
+    /// An ancestry without steps.
     pub fn new() -> Self {
         Self::default()
     }
 
-    /// Takes one step: every particle of the new generation, in order, with the index of its parent in the previous
-    /// one and the vertex it is at. In the first step the parent does not matter.
+    /// Adds one step: for every particle of the new generation, in order, the index of its parent in the previous
+    /// generation and its vertex. The first step ignores the parents.
     ///
     /// # Panics
     /// When a parent is not among the previous generation.

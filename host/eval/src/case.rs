@@ -1,4 +1,4 @@
-//! What one row of a report is about: an environment, or several that are averaged over.
+//! The subject of one row of a report: an environment, or several that are averaged over.
 
 use super::{
     environment::{Environment, EnvironmentError},
@@ -11,7 +11,7 @@ use std::{fmt, path::PathBuf, str::FromStr};
 /// One environment, or several of a kind. Path `p` goes through environment `p` modulo their number.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Case {
-    /// The name that reports carry.
+    /// The name in reports.
     pub name: String,
     /// The environments, one or more.
     pub environments: Vec<Environment>,
@@ -25,7 +25,8 @@ impl From<Environment> for Case {
     }
 }
 
-/// One environment with its labels handed out to its places anew, several times: mean and deviation move together.
+/// One environment with several random assignments of its labels to its places. Mean and standard deviation move
+/// together.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Placements {
     /// The seed of the placements; it is independent of the seed of the paths.
@@ -62,10 +63,10 @@ impl FromStr for Placements {
 }
 
 impl Placements {
-    /// Reads the environment and places its labels anew.
+    /// Reads the environment and assigns its labels at random, once for each placement.
     ///
     /// # Errors
-    /// [`EnvironmentError`] when the file is no environment.
+    /// [`EnvironmentError`] when the file is not a valid environment.
     pub fn load(&self) -> Result<Case, EnvironmentError> {
         Ok(Case::of_placements(&Environment::load(&self.file)?, self.seed, self.count))
     }
@@ -95,10 +96,10 @@ impl Case {
         Ok(Self { name: format!("family {family}"), environments, environment_seed: Some(family.seed) })
     }
 
-    /// The environment that a path goes through.
+    /// The environment of a path.
     ///
     /// # Panics
-    /// When there is none.
+    /// When the case has no environment.
     pub fn environment(&self, path: u64) -> &Environment {
         &self.environments[path as usize % self.environments.len()]
     }
@@ -110,7 +111,7 @@ mod tests {
     use std::{collections::BTreeSet, path::Path};
 
     #[test]
-    fn placements_keep_the_graph_and_hand_out_the_same_labels() {
+    fn placements_permute_the_labels_on_the_same_graph() {
         let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("environments/wean-surrogate-sd.toml");
         let placements: Placements = format!("4,20,{}", path.display()).parse().unwrap();
         let case = placements.load().unwrap();
@@ -125,13 +126,13 @@ mod tests {
         for environment in &case.environments {
             assert_eq!(environment.graph(), original.graph());
             assert_eq!(sorted(environment), sorted(&original));
-            assert!(orders.insert(labels(environment)), "every placement is another");
+            assert!(orders.insert(labels(environment)), "all placements differ");
         }
         assert_eq!(case.environment(25), &case.environments[5]);
     }
 
     #[test]
-    fn what_does_not_describe_placements_is_refused() {
+    fn malformed_placements_are_rejected() {
         for text in ["", "1", "1,2", "1,2,", "1,0,a.toml", "x,2,a.toml"] {
             assert_eq!(text.parse::<Placements>(), Err(PlacementsError), "{text}");
         }

@@ -17,7 +17,7 @@ pub struct Place {
     pub sd_mm: f64,
 }
 
-/// A connected environment whose every place can be reached.
+/// A connected graph of places and corridors, with the fingerprint statistics of each place.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Environment {
     name: String,
@@ -41,7 +41,7 @@ pub enum EnvironmentError {
         /// The id that is used twice.
         id: u32,
     },
-    /// A mean is outside of what a fingerprint can hold.
+    /// A mean is outside the range of a fingerprint.
     MeanOutOfRange {
         /// The place in question.
         id: u32,
@@ -122,7 +122,7 @@ impl Environment {
         fs::read_to_string(path).map_err(EnvironmentError::Read)?.parse()
     }
 
-    /// An environment from its places and the pairs of ids that are connected. A corridor may lead back to its own place.
+    /// An environment from its places and the pairs of ids that are connected. An edge may connect a place to itself.
     ///
     /// # Errors
     /// [`EnvironmentError`] when a place or an edge is out of range, listed twice, unknown, or cannot be reached.
@@ -156,10 +156,10 @@ impl Environment {
         Ok(Self { name, places, graph, neighbours })
     }
 
-    /// The same corridors between other places: place `i` takes the label of place `labels[i]`, mean and deviation.
+    /// The same graph with other labels: place `i` takes the mean and the standard deviation of place `labels[i]`.
     ///
     /// # Panics
-    /// When `labels` does not name a place for each place.
+    /// When `labels` does not hold one place for each place.
     pub fn with_labels_of(&self, labels: &[usize]) -> Self {
         let relabelled = |(place, &from): (&Place, &usize)| Place { id: place.id, ..self.places[from] };
         let places: Vec<Place> = self.places.iter().zip(labels).map(relabelled).collect();
@@ -167,12 +167,12 @@ impl Environment {
         Self { places, ..self.clone() }
     }
 
-    /// The name that reports carry.
+    /// The name in reports.
     pub fn name(&self) -> &str {
         &self.name
     }
 
-    /// The places in the order of the file. All other functions number them by their index here.
+    /// The places in the order of the file. All other functions refer to a place by its index here.
     pub fn places(&self) -> &[Place] {
         &self.places
     }
@@ -182,7 +182,7 @@ impl Environment {
         &self.graph
     }
 
-    /// For every place the places next to it, in ascending order.
+    /// The neighbours of every place, in ascending order.
     pub fn neighbours(&self) -> &[Vec<usize>] {
         &self.neighbours
     }
@@ -215,7 +215,7 @@ mod tests {
     }
 
     #[test]
-    fn every_fault_of_a_file_is_named() {
+    fn an_invalid_file_is_rejected_with_the_reason() {
         assert_eq!(refusal("[[1, 2], [2, 4]]", &THREE), "edge [2, 4]: there is no place 4");
         assert_eq!(refusal("[[1, 2]]", &THREE), "no walk leads from place 1 to place 3");
         assert_eq!(refusal("[[1, 2], [2, 3], [2, 1]]", &THREE), "edge [2, 1] is listed twice");

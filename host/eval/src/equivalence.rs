@@ -1,20 +1,20 @@
-//! The smallest equivalent of the traversed part of an environment: what an observer of labels alone can know at best.
+//! The smallest equivalent of the traversed part of an environment: the best map that labels alone can give.
 
 use super::{environment::Environment, graph::Graph};
 use std::collections::{BTreeMap, BTreeSet};
 
-/// The traversed part of an environment with places merged that no walk tells apart.
+/// The traversed part of an environment, with places merged that no walk can distinguish.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct SmallestEquivalent {
-    /// One vertex for every class of places, an edge for every traversed corridor between two classes. Two neighbours
-    /// of one class leave a self-loop.
+    /// One vertex for each class of places, and an edge for each traversed corridor between two classes. Two neighbours
+    /// of one class give a self-loop.
     pub graph: Graph,
     /// The class of every place of the environment; `None` for a place that was not visited.
     pub class_of_place: Vec<Option<usize>>,
 }
 
 impl SmallestEquivalent {
-    /// The smallest equivalent of what a walk saw of its environment.
+    /// The smallest equivalent of the part of an environment that a walk traversed.
     ///
     /// Places start in one class when their labels are equal (same mean and standard deviation), and classes are split
     /// until all places of a class have the same *set* of neighbour classes. Classes are numbered by their first place.
@@ -95,7 +95,7 @@ mod tests {
     }
 
     #[test]
-    fn look_alikes_with_different_surroundings_stay_apart() {
+    fn look_alikes_with_different_neighbours_stay_distinct() {
         // A1-B-A2-C: the two A differ because only one of them is next to C.
         let line = environment(&[900.0, 1500.0, 900.0, 2000.0], &[[0, 1], [1, 2], [2, 3]]);
         let smallest = SmallestEquivalent::of_traversed(&line, &[0, 1, 2, 3]);
@@ -103,14 +103,14 @@ mod tests {
     }
 
     #[test]
-    fn a_difference_far_away_keeps_a_corridor_of_look_alikes_apart() {
+    fn a_distant_difference_distinguishes_the_places_of_a_corridor() {
         let corridor = environment(&[900.0, 900.0, 900.0, 900.0, 2000.0], &[[0, 1], [1, 2], [2, 3], [3, 4]]);
         let smallest = SmallestEquivalent::of_traversed(&corridor, &[0, 1, 2, 3, 4]);
         assert_eq!(&smallest.graph, corridor.graph());
     }
 
     #[test]
-    fn what_was_not_traversed_does_not_count() {
+    fn untraversed_parts_are_ignored() {
         let ring = environment(&[900.0, 1500.0, 900.0, 2000.0], &[[0, 1], [1, 2], [2, 3], [3, 0]]);
         let smallest = SmallestEquivalent::of_traversed(&ring, &[0, 1, 2]);
         assert_eq!(smallest.graph, Graph::from_edges(2, [(0, 1)]));
@@ -118,7 +118,7 @@ mod tests {
     }
 
     #[test]
-    fn the_equivalent_of_a_whole_environment_is_that_of_an_exhaustive_walk() {
+    fn a_whole_environment_has_the_equivalent_of_an_exhaustive_walk() {
         let ring = environment(&[900.0, 1500.0, 900.0, 2000.0], &[[0, 1], [1, 2], [2, 3], [3, 0]]);
         let whole = SmallestEquivalent::of_environment(&ring);
         assert_eq!(whole, SmallestEquivalent::of_traversed(&ring, &[0, 1, 2, 3, 0]));
@@ -126,7 +126,7 @@ mod tests {
     }
 
     #[test]
-    fn an_equal_mean_with_another_deviation_is_another_label() {
+    fn equal_means_with_different_deviations_are_different_labels() {
         let places = [(1, 10.0), (2, 20.0)].map(|(id, sd_mm)| Place { id, mean_mm: 900.0, sd_mm }).to_vec();
         let pair = Environment::new("test".into(), places, &[[1, 2]]).unwrap();
         assert_eq!(SmallestEquivalent::of_traversed(&pair, &[0, 1]).graph.vertex_count(), 2);

@@ -1,4 +1,5 @@
-//! Paths as files, for other programs to map the very same ones: a table of what the filter sees, and the truth.
+//! Writes paths to files, so that other programs can map the same paths: a table of the filter's input, and the ground
+//! truth.
 
 use super::{
     case::Case,
@@ -15,13 +16,13 @@ use toposlam::Turn;
 #[derive(Debug)]
 #[non_exhaustive]
 pub enum ExportError {
-    /// There is nothing to write.
+    /// There is no path to write.
     Evaluation(EvaluationError),
     /// A file or directory was not written.
     Write {
-        /// Which.
+        /// The file or directory.
         file: String,
-        /// Why.
+        /// The error.
         error: io::Error,
     },
 }
@@ -48,7 +49,7 @@ struct Entry<'a> {
     seed: u64,
 }
 
-/// What is true of one path: `<path>.truth.json`. Places are numbered by their index.
+/// Ground truth of one path: `<path>.truth.json`. Places are numbered by their index.
 #[derive(Serialize)]
 struct TruthFile<'a> {
     /// The place of every step.
@@ -61,7 +62,7 @@ struct TruthFile<'a> {
     edges: Vec<[usize; 2]>,
     /// The check points.
     lengths: &'a [usize],
-    /// What a map should be, by check point.
+    /// The true map at each check point.
     truth: BTreeMap<usize, TruthGraph>,
 }
 

@@ -11,24 +11,24 @@ use std::{collections::BTreeSet, fmt, ops::RangeInclusive, str::FromStr};
 
 /// The means of two categories are at least this far apart, in millimetres.
 const APART_MM: f64 = 250.0;
-/// Where the means of categories lie, in millimetres.
+/// Range of the means of the categories, in millimetres.
 const MEANS_MM: RangeInclusive<f64> = 400.0..=2950.0;
-/// As many categories fit between these means.
+/// Largest number of categories whose means fit in this range.
 const MAX_LABELS: usize = 11;
-/// How many assignments of categories to a graph are tried before another graph is drawn, and how many graphs.
+/// Number of category assignments tried for each graph, and number of graphs tried.
 const ASSIGNMENTS: usize = 100;
 const GRAPHS: usize = 1000;
 
-/// Which environments belong to a family. In all of them no two places have the same set of 5-grams around them.
+/// The class of the environments of a family. In all classes, no two places have the same set of 5-grams around them.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Class {
-    /// Neighbours of a place may look alike.
+    /// Neighbours of a place may have the same category.
     General,
-    /// No place has two neighbours of one category, so the next label tells the next place.
+    /// No place has two neighbours of one category, so the next label determines the next place.
     RightResolving,
 }
 
-/// A family of random environments. Everything with a range is drawn anew for each environment, uniformly.
+/// A family of random environments. Every range is sampled uniformly for each environment.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Family {
     /// The seed of its environments; it is independent of the seed of the paths.
@@ -43,7 +43,7 @@ pub struct Family {
     pub labels: RangeInclusive<usize>,
     /// The standard deviation of the fingerprints of a place, in metres; drawn for each place.
     pub noise_m: RangeInclusive<f64>,
-    /// What holds for all its environments.
+    /// The class of all its environments.
     pub class: Class,
 }
 
@@ -57,9 +57,9 @@ pub enum FamilyError {
     Field {
         /// The name of the field.
         name: &'static str,
-        /// What stands there.
+        /// The text of the field.
         text: String,
-        /// What could stand there.
+        /// The allowed values.
         allowed: &'static str,
     },
     /// No environment of this kind was found.
@@ -166,12 +166,12 @@ impl<T: fmt::Display + PartialEq> fmt::Display for Span<'_, T> {
 }
 
 impl Family {
-    /// Environment number `index` of the family; it depends on nothing but the family and the number.
+    /// Environment number `index` of the family. It depends only on the family and the index.
     ///
-    /// Graph and categories are drawn until the class holds, so environments for which it rarely holds are rare.
+    /// Graph and categories are redrawn until the class holds, so environments for which it rarely holds are rare.
     ///
     /// # Errors
-    /// [`FamilyError::NoneFound`] when none of 1000 graphs had an assignment of categories that will do.
+    /// [`FamilyError::NoneFound`] when none of 1000 graphs had a valid assignment of categories.
     pub fn environment(&self, index: usize) -> Result<Environment, FamilyError> {
         let mut rng = path_rng(self.seed, index as u64);
         for _ in 0..GRAPHS {
@@ -207,8 +207,8 @@ impl Family {
     }
 }
 
-/// Gives every place, in random order, a random category that no other neighbour of its neighbours has. `None` when the
-/// graph has a place with more neighbours than there are categories; an empty assignment when it ran into a dead end.
+/// Gives every place, in random order, a random category that no other neighbour of its neighbours has. `None` when a
+/// place has more neighbours than there are categories; an empty assignment when the search reaches a dead end.
 fn draw_right_resolving(neighbours: &[Vec<usize>], labels: usize, rng: &mut PathRng) -> Option<Vec<usize>> {
     if neighbours.iter().any(|around| around.len() > labels) {
         return None;
@@ -231,8 +231,8 @@ fn draw_right_resolving(neighbours: &[Vec<usize>], labels: usize, rng: &mut Path
     Some(categories.into_iter().flatten().collect())
 }
 
-/// Whether no two places have the same set of 5-grams with them in the middle, which is to say the same set of label
-/// strings of the walks of two steps from them.
+/// Whether no two places have the same set of 5-grams centred on them, which is the same set of label strings of the
+/// two-step walks from them.
 fn are_distinguishable(neighbours: &[Vec<usize>], categories: &[usize]) -> bool {
     let around = |place: usize| -> BTreeSet<[usize; 3]> {
         let walks = neighbours[place].iter().flat_map(|&next| neighbours[next].iter().map(move |&last| (next, last)));
@@ -241,7 +241,7 @@ fn are_distinguishable(neighbours: &[Vec<usize>], categories: &[usize]) -> bool 
     (0..categories.len()).map(around).collect::<BTreeSet<_>>().len() == categories.len()
 }
 
-/// Means of categories in millimetres, ascending and far enough apart, to 0.1 mm.
+/// Draws the means of the categories in millimetres, ascending and far enough apart, to 0.1 mm.
 fn draw_means_mm(labels: usize, rng: &mut PathRng) -> Vec<f64> {
     let slack_mm = MEANS_MM.end() - MEANS_MM.start() - APART_MM * (labels as f64 - 1.0);
     let mut offsets: Vec<f64> = (0..labels).map(|_| rng.random_range(0.0..=slack_mm)).collect();
@@ -283,7 +283,7 @@ mod tests {
         }
     }
 
-    /// The places next to each place, and the category of each place.
+    /// The neighbours of each place, and the category of each place.
     fn look(environment: &Environment) -> (&[Vec<usize>], Vec<usize>) {
         let mean = |place: &Place| place.mean_mm.to_bits() as usize;
         (environment.neighbours(), environment.places().iter().map(mean).collect())
@@ -297,7 +297,7 @@ mod tests {
     }
 
     #[test]
-    fn the_next_label_tells_the_next_place_in_a_right_resolving_family_only() {
+    fn the_next_label_determines_the_next_place_only_in_a_right_resolving_family() {
         for class in ["right-resolving", "general"] {
             let family = family(&format!("3,20,14,24,2-3,3-6,0.03,{class}"));
             let environments = (0..20).map(|index| family.environment(index).unwrap()).collect::<Vec<_>>();
@@ -311,7 +311,7 @@ mod tests {
     }
 
     #[test]
-    fn an_environment_depends_on_family_and_number_alone() {
+    fn an_environment_depends_only_on_family_and_index() {
         let family_1 = family("1,2,8,14,2.5,4,0.05");
         assert_eq!(family_1.environment(1), family_1.environment(1));
         assert_ne!(family_1.environment(1), family_1.environment(0));
@@ -319,7 +319,7 @@ mod tests {
     }
 
     #[test]
-    fn places_with_the_same_surroundings_are_not_distinguishable() {
+    fn places_with_the_same_5_grams_are_not_distinguishable() {
         let ring = |places: usize| -> Vec<Vec<usize>> {
             (0..places).map(|place| vec![(place + 1) % places, (place + places - 1) % places]).collect()
         };
@@ -329,7 +329,7 @@ mod tests {
     }
 
     #[test]
-    fn families_are_read_and_written_alike_and_every_fault_is_named() {
+    fn families_round_trip_through_text_and_invalid_fields_are_named() {
         for text in ["1,20,8,14,2-3,3-6,0.03-0.06,right-resolving", "7,1,11,11,2.5,4,0.05,general"] {
             assert_eq!(family(text).to_string(), text);
         }

@@ -1,4 +1,4 @@
-//! Counts of faults as lines of text.
+//! Fault counts as lines of text.
 
 use toposlam::{FaultCounters, FaultKind};
 

@@ -7,7 +7,7 @@ use svg::{
     node::element::{Group, Line, Rectangle, Text, Title},
 };
 
-/// What a histogram counts.
+/// The quantity that a histogram shows.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Quantity {
     /// The distance of the map from the n-grams of the environment (Fig. 4).
@@ -16,12 +16,12 @@ pub enum Quantity {
     Vertices,
 }
 
-/// A robust and a paper's row of the same case and check point, drawn side by side.
+/// The rows of the robust and of the paper's filter for the same case and check point, drawn side by side.
 #[derive(Clone, Copy, Debug)]
 pub struct Pair<'a> {
-    /// Ours, and the paper's.
+    /// The row of the robust filter, and that of the paper's filter.
     pub rows: [&'a Row; 2],
-    /// How many places the environments have, if they all have as many.
+    /// Number of places of the environments, if they all have the same number.
     pub places: Option<usize>,
 }
 
@@ -30,7 +30,7 @@ const NAMES: [&str; 2] = ["robust filter", "paper's filter"];
 const INK: &str = "#222222";
 const FAINT: &str = "#dcdcdc";
 const PANEL: (f64, f64) = (420.0, 220.0);
-/// Around the panels: left of each for the shares, above each for the name, below each for the axis.
+/// Margins of a panel: left for the shares, above for the name, below for the axis.
 const LEFT: f64 = 66.0;
 const ABOVE: f64 = 62.0;
 const BELOW: f64 = 54.0;
@@ -39,7 +39,7 @@ const RIGHT: f64 = 24.0;
 /// The bin of [`Row::consistency_bins`] that infinite distances are in.
 const INFINITE: u16 = u16::MAX / BIN_MM * BIN_MM;
 
-/// Draws one quantity for every pair, a line of two panels for each. Both panels of a line have the same axes.
+/// Draws one quantity for every pair, one line of two panels for each. Both panels of a line share their axes.
 pub fn draw(quantity: Quantity, pairs: &[Pair]) -> String {
     let line_height = ABOVE + PANEL.1 + BELOW;
     let (width, height) = (2.0 * (LEFT + PANEL.0) + RIGHT, HEAD + line_height * pairs.len() as f64);
@@ -71,7 +71,7 @@ pub fn draw(quantity: Quantity, pairs: &[Pair]) -> String {
     document.to_string()
 }
 
-/// The bins and the largest share of two panels.
+/// Bins and largest share of two panels.
 struct Axes {
     /// The number of each bin, in order; `None` is the bin of infinite distances.
     bins: Vec<Option<usize>>,
@@ -90,7 +90,7 @@ impl Axes {
             (Some(least), Some(most)) => (least.saturating_sub(1)..=most + 1).map(Some).collect(),
             _ => Vec::new(),
         };
-        // A panel of a few bars has room around them.
+        // A panel with few bars gets empty bins.
         while bins.len() < 8 {
             bins.push(Some(bins.last().copied().flatten().map_or(0, |last| last + 1)));
         }
@@ -107,7 +107,7 @@ impl Axes {
     }
 }
 
-/// How many maps are in each bin; the bin of infinite distances is `None`.
+/// Number of maps in each bin; the bin of infinite distances is `None`.
 fn counts(quantity: Quantity, row: &Row) -> BTreeMap<Option<usize>, usize> {
     match quantity {
         Quantity::Vertices => row.vertices.iter().map(|(&vertices, &maps)| (Some(vertices), maps)).collect(),
@@ -118,7 +118,7 @@ fn counts(quantity: Quantity, row: &Row) -> BTreeMap<Option<usize>, usize> {
     }
 }
 
-/// The distance of the lines that tell the share, in percent.
+/// Distance between the grid lines of the axis of shares, in percent.
 fn share_step(largest_percent: f64) -> usize {
     [1, 2, 5, 10].into_iter().find(|&step| largest_percent <= 5.0 * step as f64).unwrap_or(20)
 }
@@ -147,7 +147,7 @@ fn panel(quantity: Quantity, row: &Row, axes: &Axes, places: Option<usize>, side
     }
     panel = panel.add(line((0.0, height), (width, height), INK));
     for (slot, label) in tick_labels(quantity, &axes.bins) {
-        // Distances are told at the edges of bins, numbers of vertices in the middle.
+        // Distances are labelled at the edges of bins, numbers of vertices in the middle.
         let between = quantity == Quantity::Consistency && label != "∞";
         let at = bin_width * (slot as f64 + if between { 0.0 } else { 0.5 });
         panel = panel
@@ -158,7 +158,7 @@ fn panel(quantity: Quantity, row: &Row, axes: &Axes, places: Option<usize>, side
     let true_bin = places.and_then(|places| Some((axes.bins.iter().position(|&bin| bin == Some(places))?, places)));
     if let Some((slot, places)) = true_bin {
         let at = bin_width * (slot as f64 + 0.5);
-        // A white rim keeps the words legible over the bars.
+        // A white outline keeps the text legible over the bars.
         let label = words(&format!("{places} places"), at + 6.0, 10.0, 12.0).set("font-style", "italic");
         panel = panel
             .add(line((at, -4.0), (at, height), INK).set("stroke-dasharray", "4 4"))
@@ -171,7 +171,7 @@ fn panel(quantity: Quantity, row: &Row, axes: &Axes, places: Option<usize>, side
     panel.add(words(axis, width / 2.0, height + 41.0, 13.0).set("text-anchor", "middle"))
 }
 
-/// Which bins carry a label, and what it says: at most about a dozen.
+/// The labelled bins and their labels: at most about a dozen.
 fn tick_labels(quantity: Quantity, bins: &[Option<usize>]) -> Vec<(usize, String)> {
     let (steps, factor) = match quantity {
         // 20, 100, 200, 500 mm and 1 m.
@@ -226,7 +226,7 @@ mod tests {
     }
 
     #[test]
-    fn a_picture_has_a_bar_for_each_bin_that_occurs() {
+    fn a_figure_has_a_bar_for_each_nonempty_bin() {
         let ours = row(&[(11, 9), (12, 1)], &[(0, 4), (20, 6)]);
         let theirs = row(&[(9, 2), (11, 3), (14, 5)], &[(40, 9), (INFINITE, 1)]);
         let pairs = [Pair { rows: [&ours, &theirs], places: Some(11) }];
@@ -239,7 +239,7 @@ mod tests {
     }
 
     #[test]
-    fn both_panels_share_the_bins_that_hold_everything() {
+    fn both_panels_share_bins_that_cover_all_values() {
         let ours = row(&[(11, 10)], &[(0, 10)]);
         let theirs = row(&[(20, 10)], &[(INFINITE, 10)]);
         let pair = Pair { rows: [&ours, &theirs], places: Some(25) };

@@ -1,4 +1,4 @@
-//! A plain undirected graph: what remains of an environment or of a map once its labels are gone.
+//! A plain undirected graph: an environment or a map without its labels.
 
 use petgraph::{Undirected, algo::is_isomorphic};
 use std::collections::BTreeSet;
@@ -28,16 +28,16 @@ impl Graph {
         graph
     }
 
-    /// Connects two vertices; `false` when they were connected before.
+    /// Connects two vertices; returns `false` when they are already connected.
     ///
     /// # Panics
     /// When a vertex is outside of `0..vertex_count`.
     pub fn add_edge(&mut self, a: usize, b: usize) -> bool {
-        assert!(a.max(b) < self.vertex_count, "edge {a}-{b} leaves a graph of {} vertices", self.vertex_count);
+        assert!(a.max(b) < self.vertex_count, "edge {a}-{b} is outside a graph of {} vertices", self.vertex_count);
         self.edges.insert((a.min(b), a.max(b)))
     }
 
-    /// How many vertices there are.
+    /// Number of vertices.
     pub fn vertex_count(&self) -> usize {
         self.vertex_count
     }
@@ -47,7 +47,7 @@ impl Graph {
         &self.edges
     }
 
-    /// For every vertex its neighbours in ascending order; a vertex with a self-loop is its own neighbour.
+    /// The neighbours of every vertex, in ascending order; a vertex with a self-loop is its own neighbour.
     pub fn neighbours(&self) -> Vec<Vec<usize>> {
         let mut neighbours = vec![BTreeSet::new(); self.vertex_count];
         for &(a, b) in &self.edges {
@@ -57,12 +57,12 @@ impl Graph {
         neighbours.into_iter().map(|set| set.into_iter().collect()).collect()
     }
 
-    /// Whether a walk leads from the first vertex to every other.
+    /// Whether every vertex is reachable from the first one.
     pub fn is_connected(&self) -> bool {
         first_unreached(&self.neighbours()).is_none()
     }
 
-    /// Whether the vertices of the two graphs can be matched one to one so that the edges agree. Labels play no part.
+    /// Whether the two graphs are isomorphic, regardless of labels.
     pub fn is_isomorphic_to(&self, other: &Self) -> bool {
         is_isomorphic(&self.to_petgraph(), &other.to_petgraph())
     }
@@ -77,7 +77,7 @@ impl Graph {
     }
 }
 
-/// The first vertex that no walk from vertex 0 leads to.
+/// The first vertex that is not reachable from vertex 0.
 pub(crate) fn first_unreached(neighbours: &[Vec<usize>]) -> Option<usize> {
     let mut reached = vec![false; neighbours.len()];
     let mut open = vec![0];

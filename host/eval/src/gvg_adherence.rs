@@ -1,28 +1,29 @@
-//! How near to the Voronoi graph a recorded robot drove.
+//! Measures how closely a recorded robot followed the Voronoi graph.
 //!
-//! The place detector finds what a robot comes by that keeps to the generalised Voronoi graph, where the two nearest obstacles are
-//! equally close. How much of a recording is such a drive says how much of it can give places.
+//! The place detector detects the places of a robot that follows the generalised Voronoi graph, where the two nearest
+//! obstacles are equidistant. Only the frames of a recording that are on this graph can give places.
 
 use std::fmt;
 
 use toposlam::place::PlaceConfig;
 use toposlam::ring::{Echo, RingFrame, RingGeometry};
 
-/// How many frames there are, and how many of them show the Voronoi graph.
+/// Number of frames, and number of those on the Voronoi graph.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct GvgAdherence {
     /// All frames.
     pub frames: usize,
-    /// Those with a second obstacle about as near as the nearest.
+    /// Frames whose second obstacle is about as near as the nearest.
     pub on_graph: usize,
-    /// Those with a third one, too.
+    /// Frames whose third obstacle is about as near, too.
     pub at_meet_point: usize,
-    /// What counts as equally near, in millimetres.
+    /// Largest difference between equally near obstacles, in millimetres.
     pub equidistance_mm: u16,
 }
 
 impl GvgAdherence {
-    /// Measures a recording with the place detector's notion of obstacles, but frame by frame, without its smoothing.
+    /// Measures a recording frame by frame, with the place detector's definition of obstacles but without its
+    /// smoothing.
     pub fn of<const SONARS: usize>(
         frames: &[RingFrame<SONARS>],
         geometry: &RingGeometry<SONARS>,
@@ -42,7 +43,7 @@ impl GvgAdherence {
     }
 }
 
-/// The ranges of the nearest three obstacles in separate bearings, the nearest first.
+/// Ranges of the three nearest obstacles in separate bearings, the nearest first.
 fn nearest_mm<const SONARS: usize>(
     frame: &RingFrame<SONARS>,
     geometry: &RingGeometry<SONARS>,
@@ -99,7 +100,7 @@ mod tests {
         assert_eq!(measured([500, 900, 900, 900, 650, 900, 900, 900]), (1, 0));
         assert_eq!(measured([500, 900, 900, 900, 651, 900, 900, 900]), (0, 0));
         assert_eq!(measured([500, 900, 600, 900, 650, 900, 900, 900]), (1, 1));
-        assert_eq!(measured([500, 900, 20, 900, 9000, 900, 900, 900]), (0, 0), "nonsense and silence are no obstacles");
+        assert_eq!(measured([500, 900, 20, 900, 9000, 900, 900, 900]), (0, 0), "invalid and silent sonars are ignored");
         assert_eq!(measured([7000; 8]), (0, 0));
     }
 

@@ -1,45 +1,45 @@
-//! What the robot tells the filter of a place besides its fingerprint: how it turned, and how many ways it counted.
+//! The hints that accompany the fingerprint of a place: how the robot turned, and the degree of the place.
 
 use super::{environment::Environment, walk::PathRng};
 use rand::RngExt;
 use std::{fmt, str::FromStr};
 use toposlam::Turn;
 
-/// How often a degree is told right; it is one too small or one too large equally often otherwise.
+/// Probability that a reported degree is right. Otherwise it is one too small or one too large, equally often.
 const RIGHT_DEGREE: f64 = 0.9;
-/// The largest degree that an observation tells apart.
+/// Largest degree of an observation.
 const MAX_DEGREE: usize = 7;
 
-/// Which hints come with a fingerprint, and how reliable they are.
+/// Which hints accompany a fingerprint, and how reliable they are.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Hints {
-    /// Whether the robot tells how it left the place before.
+    /// Whether the robot reports how it left the previous place.
     pub turn: bool,
-    /// Whether the robot tells how many ways lead away from a place: the true number in 90 % of the visits, one less
-    /// (but at least 1) and one more in 5 % each.
+    /// Whether the robot reports the degree of a place: the true degree in 90 % of the visits, one less (but at least
+    /// 1) and one more in 5 % each.
     pub degree: bool,
-    /// The probability that a hint is not given, 0 to 1; for each hint of each place on its own.
+    /// Probability that a hint is missing, 0 to 1; independent for each hint of each place.
     pub missing: f64,
-    /// The probability that a turn is told the other way round, 0 to 1.
+    /// Probability that a turn is reversed, 0 to 1.
     pub wrong: f64,
 }
 
 /// The hints of one visit.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Hint {
-    /// How the robot left the place before.
+    /// How the robot left the previous place.
     pub turn: Option<Turn>,
-    /// How many ways lead away, 1 to 7.
+    /// Degree of the place, 1 to 7.
     pub degree: Option<u8>,
 }
 
-/// Why a text does not say which hints to give.
+/// Why a text does not describe hints.
 #[derive(Clone, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum HintsError {
-    /// The hints have no such name.
+    /// Unknown kind of hints.
     Kind(String),
-    /// There is no such setting.
+    /// Unknown setting.
     Unknown(String),
     /// A probability is not a number from 0 to 1.
     Probability(String),
@@ -104,8 +104,8 @@ impl fmt::Display for Hints {
 }
 
 impl Hints {
-    /// Draws the hints for every place of a walk. However reliable they are and whichever are given, the same number of
-    /// draws is made, so that the same generator gives the same hints where they are given.
+    /// Draws the hints for every place of a walk. The number of draws does not depend on the settings, so the same
+    /// generator gives the same hints wherever they are given.
     pub fn draw(&self, environment: &Environment, walk: &[usize], rng: &mut PathRng) -> Vec<Hint> {
         let visit = |step: usize| {
             let [turn_missing, turn_wrong, degree_missing, degree_noise]: [f64; 4] = rng.random();
@@ -123,7 +123,7 @@ impl Hints {
     }
 }
 
-/// The degree that is told of a place, with `noise` uniform from 0 to 1.
+/// The reported degree of a place, with `noise` uniform from 0 to 1.
 fn told_degree(degree: usize, noise: f64) -> u8 {
     let one_sided = (1.0 - RIGHT_DEGREE) / 2.0;
     let told = match noise {
@@ -160,7 +160,7 @@ mod tests {
     }
 
     #[test]
-    fn a_turn_says_whether_the_robot_came_back() {
+    fn a_turn_hint_states_whether_the_robot_turned_back() {
         let (walk, hints) = draw("turn", 1);
         assert_eq!([hints[0], hints[1]], [Hint::default(); 2]);
         for (places, hint) in walk.windows(3).zip(&hints[2..]) {
@@ -170,7 +170,7 @@ mod tests {
     }
 
     #[test]
-    fn missing_and_wrong_hints_occur_as_often_as_they_should() {
+    fn missing_and_wrong_hints_occur_at_their_configured_rates() {
         let (_, truth) = draw("both", 2);
         let (walk, hints) = draw("both,missing=0.3,wrong=0.1", 2);
         assert!((share(hints[2..].iter().map(|hint| hint.turn.is_none())) - 0.3).abs() < 0.02);
@@ -188,7 +188,7 @@ mod tests {
     }
 
     #[test]
-    fn the_words_for_hints_are_read_and_written_alike() {
+    fn hints_round_trip_through_text() {
         for text in ["none", "turn", "degree,missing=0.3", "both,missing=0.25,wrong=0.05"] {
             assert_eq!(text.parse::<Hints>().unwrap().to_string(), text);
         }

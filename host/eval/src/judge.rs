@@ -1,4 +1,4 @@
-//! One filter along one path, and how right its map is at each check point.
+//! Runs one filter on one path and judges its map at each check point.
 
 use super::{
     candidate::{Candidate, Start, VERTICES, prior_table},
@@ -11,43 +11,43 @@ use super::{
 use std::time::{Duration, Instant};
 use toposlam::{Consistency, Direction, Evidence, History, Map, NgramLength, VertexId};
 
-/// Whether a map is exact is looked at after every so many places, and at the check points.
+/// Interval between tests for an exact map, in places; check points are tested, too.
 pub const EXACT_EVERY: usize = 10;
 
-/// What one path contributes.
+/// The results of one path.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PathResult {
     /// Whether the path traverses every edge.
     pub exhaustive: bool,
-    /// One for each check point.
+    /// One judgement for each check point.
     pub judgements: Vec<Judgement>,
-    /// How often the filter wanted a vertex that its map had no room for.
+    /// Number of times that the filter needed a new vertex and its map was full.
     pub vertices_full: u32,
-    /// How long the n-grams of the prior took to map.
+    /// Time to map the n-grams of the prior.
     pub prior_time: Duration,
 }
 
-/// How right a map is after some places of the path.
+/// Quality of a map after some places of the path.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Judgement {
     /// The score of the map.
     pub score: MapScore,
     /// How many vertices the map has.
     pub vertices: usize,
-    /// The share of the places so far at which the best hypothesis of that moment knew where the robot was.
+    /// The share of the places so far at which the best hypothesis of that moment was localised.
     pub localised_share: f64,
     /// The two-sided distance of Eq. 2, in millimetres; `u16::MAX` when it is infinite.
     pub consistency_mm: u16,
-    /// The first place, counted from 1, from which on the map was exact up to now, as far as was looked at.
+    /// The first place, counted from 1, from which on the map passed every test for an exact map.
     pub exact_from: Option<usize>,
-    /// Whether a long search that starts at the true path ends in another map, which then has the better score; `None` when
-    /// there was no search.
+    /// Whether a long search from the true path ends in another map, which then has the better score; `None` without a
+    /// search.
     pub leaves_truth: Option<bool>,
-    /// How long the filter took for the places so far, refinement included.
+    /// Time of the filter for the places so far, refinement included.
     pub filter_time: Duration,
 }
 
-/// Drives a filter along a path and judges it.
+/// Runs a filter on a path and judges its maps.
 pub fn judge(trial: &Trial, settings: &Settings, start: Start) -> PathResult {
     let mut candidate = start(settings, trial);
     let started = Instant::now();
@@ -74,7 +74,7 @@ pub fn judge(trial: &Trial, settings: &Settings, start: Start) -> PathResult {
 
         let steps = step + 1;
         let path = candidate.path(before + steps);
-        // The check points that are still ahead.
+        // The remaining check points.
         for (truth, localised) in truths.iter().zip(&mut localised).skip(judgements.len()) {
             *localised += usize::from(is_localised(&path, &truth.classes[..before + steps]));
         }
@@ -130,11 +130,11 @@ fn graph_of(map: &Map<VERTICES>) -> Graph {
     Graph::from_edges(map.vertices().len(), edges)
 }
 
-/// The distance of a map after so many places of the path, in millimetres.
+/// Distance of a map after this number of places of the path, in millimetres.
 type Distance<'a> = Box<dyn Fn(&Map<VERTICES>, usize) -> u16 + 'a>;
 
-/// The two-sided distance (Eq. 2) of a map from the n-grams of the prior, or, without one, from those of the first so
-/// many places of the path; in millimetres, whatever direction the filter takes.
+/// The two-sided distance (Eq. 2) of a map from the n-grams of the prior or, without a prior, of the path so far; in
+/// millimetres, whatever direction the filter takes.
 fn distance_mm<'a>(trial: &'a Trial, settings: &Settings) -> Distance<'a> {
     let length = settings.ngram_length;
     let ngrams = match settings.prior {
@@ -186,8 +186,8 @@ mod tests {
     };
     use toposlam::{Fingerprint, Observation, RobustConfig};
 
-    /// A candidate that has the whole environment as its map from the start, and knows where the robot is but for the
-    /// first so many places.
+    /// A candidate whose map is the whole environment from the start, and whose location is right except for the first
+    /// `LOST_FOR` places.
     struct Oracle {
         map: Map<VERTICES>,
         places: Vec<usize>,
@@ -256,7 +256,7 @@ mod tests {
     }
 
     #[test]
-    fn the_whole_environment_is_exact_at_once_when_it_was_explored() {
+    fn a_map_of_the_explored_environment_is_exact_at_once() {
         let result = judged(PriorSource::Exploration, &[1, 4, 30], oracle::<0>);
         assert_eq!(result.vertices_full, 3);
         for (judgement, exact_from) in result.judgements.iter().zip([1, 1, 1]) {
@@ -268,7 +268,7 @@ mod tests {
     }
 
     #[test]
-    fn without_a_prior_a_map_is_judged_by_what_was_traversed() {
+    fn without_a_prior_a_map_is_judged_by_the_traversed_part() {
         let result = judged(PriorSource::None, &[1, 30], oracle::<0>);
         let [first, last] = [&result.judgements[0], &result.judgements[1]];
         assert!(!first.score.exact && last.score.exact);
@@ -276,7 +276,7 @@ mod tests {
     }
 
     #[test]
-    fn a_robot_that_was_lost_for_a_while_is_located_online_once_most_visits_are_right() {
+    fn a_lost_robot_is_localised_online_once_most_visits_are_right() {
         let result = judged(PriorSource::None, &[12, 60], oracle::<4>);
         let [first, last] = [&result.judgements[0], &result.judgements[1]];
         assert_eq!(last.score.location, 56.0 / 60.0);

@@ -1,7 +1,7 @@
-//! Laps of one round: which places of the first lap the later laps bring again, and what the map makes of them.
+//! Compares the laps of a recording: which places of the first lap the later laps repeat, and the shape of the map.
 //!
-//! A robot that drives one round over and over should come by the same places in every lap, and a right map is then a cycle.
-//! [`Laps`] lays the later laps beside the first one, and [`Shape`] says what the map is.
+//! A robot that drives the same round repeatedly should detect the same places in every lap, and a right map is then a
+//! cycle. [`Laps`] compares the later laps with the first one, and [`Shape`] classifies the map.
 
 use std::cmp::Reverse;
 use std::fmt;
@@ -9,18 +9,18 @@ use std::num::NonZeroU32;
 
 use crate::graph::Graph;
 
-/// A place that the robot came by.
+/// A detected place.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Visit {
     /// The frame, counted from 0 at the start of the recording.
     pub frame: u32,
     /// The radius of the place.
     pub radius_mm: u16,
-    /// The vertex that the final map gives to it; `None` when the filter has forgotten.
+    /// The vertex of the place in the final map; `None` for a place that has left the filter's history.
     pub vertex: Option<usize>,
 }
 
-/// How far two sightings of one spot may be apart.
+/// Largest difference between two detections of one place.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Tolerance {
     /// In position, in frames.
@@ -36,7 +36,7 @@ impl Tolerance {
         Self { frames: lap_frames.get() / 10, radius_mm: 150 }
     }
 
-    /// How many frames apart two sightings are; `None` when they are not of one spot.
+    /// Offset between two detections in frames; `None` when they are not of one place.
     fn apart(self, expected: &Expected, visit: &Visit) -> Option<u32> {
         let frames = expected.frame.abs_diff(visit.frame);
         let alike = expected.first.radius_mm.abs_diff(visit.radius_mm) <= self.radius_mm;
@@ -44,24 +44,24 @@ impl Tolerance {
     }
 }
 
-/// A place of the first lap, as a later lap should bring it.
+/// A place of the first lap, as expected in a later lap.
 struct Expected {
     lap: usize,
     frame: u32,
     first: Visit,
 }
 
-/// One lap beside the first.
+/// One lap compared with the first.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Lap {
     /// The places of this lap, in order.
     pub visits: Vec<Visit>,
-    /// The places of the first lap that come again, with what they are in this lap. Near a lap's ends the latter may be
-    /// among the visits of the lap beside.
+    /// The repeated places of the first lap, each with its detection in this lap. Near the ends of a lap, the detection
+    /// may be among the visits of a neighbouring lap.
     pub again: Vec<(Visit, Visit)>,
-    /// The places of the first lap that do not come again. Those behind the end of the recording are not among them.
+    /// The places of the first lap that are not repeated. Those beyond the end of the recording are not among them.
     pub missing: Vec<Visit>,
-    /// The places of this lap that are none of the first.
+    /// The places of this lap that are not in the first lap.
     pub extra: Vec<Visit>,
 }
 
@@ -74,11 +74,11 @@ pub struct Laps {
 }
 
 impl Laps {
-    /// Lays the laps of a recording of this many frames beside each other. `visits` are in the order of their frames.
+    /// Compares the laps of a recording of this many frames. `visits` are in the order of their frames.
     ///
-    /// The places of the first lap, expected again one, two and more laps later, and the later places are matched in order and one
-    /// to one: as many as the tolerance allows, and of those matchings one with the least sum of deviations. Time and memory
-    /// go with the square of the number of places.
+    /// The places of the first lap, expected one, two and more laps later, and the later places are matched in order
+    /// and one to one: as many as the tolerance allows, and of those matchings one with the least sum of deviations.
+    /// Time and memory are quadratic in the number of places.
     pub fn compare(visits: &[Visit], lap_frames: NonZeroU32, frames: u32, tolerance: Tolerance) -> Self {
         let lap_of = |visit: &Visit| (visit.frame / lap_frames) as usize;
         let count = visits.iter().map(|visit| lap_of(visit) + 1).max().unwrap_or(0);
@@ -110,15 +110,15 @@ impl Laps {
         Self { lap_frames, tolerance, laps }
     }
 
-    /// The laps in order; the first is only what the others are held to.
+    /// The laps in order. The first is the reference for the others.
     pub fn laps(&self) -> &[Lap] {
         &self.laps
     }
 }
 
-/// For each place that is expected the place that it is, by the best matching in order.
+/// The match of each expected place in the best matching in order.
 fn matched(expected: &[Expected], visits: &[Visit], tolerance: Tolerance) -> Vec<Option<usize>> {
-    // The best of each rest of the two lists: most matches, then least deviation.
+    // The best matching of each pair of suffixes of the two lists: most matches, then least deviation.
     let mut best = vec![vec![(0_usize, Reverse(0_u32)); visits.len() + 1]; expected.len() + 1];
     let with = |rest: (usize, Reverse<u32>), apart: u32| (rest.0 + 1, Reverse(rest.1.0 + apart));
     for (row, wanted) in expected.iter().enumerate().rev() {
@@ -189,7 +189,7 @@ impl fmt::Display for Laps {
     }
 }
 
-/// Whether the map gives the same vertex to both.
+/// Whether both have the same vertex in the map.
 fn is_same(first: &Visit, again: &Visit) -> bool {
     first.vertex.is_some() && first.vertex == again.vertex
 }
@@ -199,7 +199,7 @@ fn listed(items: impl Iterator<Item = String>) -> String {
     if items.is_empty() { "none".to_owned() } else { items.join(", ") }
 }
 
-/// A vertex, or a dash for a place whose vertex the filter has forgotten.
+/// A vertex, or a dash for a place that has left the filter's history.
 pub struct Named(pub Option<usize>);
 
 impl fmt::Display for Named {
@@ -211,16 +211,16 @@ impl fmt::Display for Named {
     }
 }
 
-/// What a map is, as a graph.
+/// The shape of a map as a graph.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Shape {
     /// Three or more vertices in a ring: connected, and every vertex with exactly two neighbours.
     Cycle,
-    /// Connected without a circle, and no vertex with more than two neighbours; one vertex alone is a chain.
+    /// Connected and acyclic, and no vertex with more than two neighbours; a single vertex is a chain.
     Chain,
-    /// Connected without a circle, and with a fork.
+    /// Connected and acyclic, with a fork.
     Tree,
-    /// Connected, with this many independent circles, self-loops among them, and no ring.
+    /// Connected, with this many independent cycles, self-loops included, and not a ring.
     Circles(usize),
     /// Not connected.
     Apart,
@@ -229,7 +229,7 @@ pub enum Shape {
 }
 
 impl Shape {
-    /// What this graph is.
+    /// Classifies a graph.
     pub fn of(graph: &Graph) -> Self {
         let (vertices, edges) = (graph.vertex_count(), graph.edges().len());
         if vertices == 0 {
@@ -245,7 +245,7 @@ impl Shape {
         match (edges + 1).saturating_sub(vertices) {
             0 if at_most_two => Self::Chain,
             0 => Self::Tree,
-            // One circle and no vertex off it.
+            // One cycle and no vertex off it.
             1 if at_most_two && !loops => Self::Cycle,
             circles => Self::Circles(circles),
         }
@@ -279,7 +279,7 @@ mod tests {
     }
 
     #[test]
-    fn a_place_comes_again_when_position_and_radius_are_within_the_tolerance() {
+    fn a_place_is_repeated_when_position_and_radius_are_within_the_tolerance() {
         let first = visit(50, 1000, 0);
         for (other, again) in [
             (visit(160, 1150, 0), true),
@@ -299,7 +299,7 @@ mod tests {
     }
 
     #[test]
-    fn one_place_stands_for_one_place_and_the_most_come_again_before_the_nearest() {
+    fn matching_is_one_to_one_and_prefers_more_matches_to_nearer_ones() {
         // The place at 152 is nearest to both; then the one at 159 is left for the second.
         let visits = [visit(50, 1000, 0), visit(55, 1000, 1), visit(152, 1000, 0), visit(159, 1000, 1)];
         let laps = compared(&visits, 200);
@@ -311,7 +311,7 @@ mod tests {
     }
 
     #[test]
-    fn a_place_at_a_laps_end_may_come_again_in_the_lap_beside() {
+    fn a_place_at_the_end_of_a_lap_may_be_repeated_in_the_neighbouring_lap() {
         let visits = [visit(5, 1000, 0), visit(98, 2000, 1), visit(103, 1000, 0), visit(203, 2000, 1)];
         let laps = compared(&visits, 300);
         let [_, two, three] = laps.laps() else { panic!("{laps}") };
@@ -322,16 +322,16 @@ mod tests {
     }
 
     #[test]
-    fn behind_the_end_of_the_recording_nothing_is_missing() {
+    fn places_beyond_the_end_of_the_recording_are_not_missing() {
         let visits = [visit(20, 1000, 0), visit(80, 2000, 1), visit(120, 1000, 0)];
         assert_eq!(compared(&visits, 181).laps()[1].missing, [visits[1]]);
         assert_eq!(compared(&visits, 180).laps()[1].missing, []);
-        assert_eq!(compared(&visits, 90).laps().len(), 2, "a visit makes its lap");
+        assert_eq!(compared(&visits, 90).laps().len(), 2, "a visit creates its lap");
         assert_eq!(compared(&[], 0).laps(), []);
     }
 
     #[test]
-    fn the_text_says_how_many_come_again_and_as_which_vertex() {
+    fn the_text_lists_repeated_places_and_their_vertices() {
         let visits = [
             visit(20, 1000, 3),
             visit(80, 2000, 1),

@@ -1,12 +1,12 @@
-//! How often maps are right: random paths through known environments, scored against what can be known at best.
+//! Measures how often maps are right, on random paths through known environments, against the best possible map.
 //!
-//! A [`case`] gives the environments of one row of the report, a [`trial`] what happens on one path, a [`candidate`] the
-//! filter that maps it, and [`settings`] how much of what. [`judge`] brings them together, [`run`] does it for all paths, and
-//! [`report`] sums up.
+//! A [`case`] holds the environments of one row of the report, a [`trial`] one path, a [`candidate`] the filter that
+//! maps it, and [`settings`] the parameters. [`judge`] evaluates one path, [`run`] evaluates all paths, and [`report`]
+//! summarises the results.
 //!
-//! [`mapping`] makes a map of ring frames on this computer, from a simulation or from a [`range_csv`] of a real ring; [`gvg_adherence`] says
-//! how near to the Voronoi graph a recorded robot drove, and [`laps`] compares the laps of a round. [`soak`] lets a simulated robot live
-//! with faults for hours.
+//! [`mapping`] maps ring frames on the host, from a simulation or from a [`range_csv`] recording of a real ring.
+//! [`gvg_adherence`] measures how closely a recorded robot followed the Voronoi graph, and [`laps`] compares the laps
+//! of a recording. [`soak`] runs a simulated robot with faults for hours.
 
 pub mod ancestry;
 pub mod candidate;

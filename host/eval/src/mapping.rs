@@ -1,10 +1,10 @@
-//! A map made on this computer by the very stages that run on the robot, with the log that a person wants of it.
+//! Maps ring frames on the host with the same stages as on the robot, and logs every step.
 //!
 //! ```
 //! use toposlam_eval::mapping::{FilterChoice, Mapping};
 //! use toposlam_sim::world::{GroundTruth, Plan, RobotModel, Simulation};
 //!
-//! let plan = Plan::built_in("ring").expect("it is built in");
+//! let plan = Plan::built_in("ring").expect("a built-in plan");
 //! let mut simulation = Simulation::new(&plan, RobotModel::default(), 7)?;
 //! let mut ground_truth = GroundTruth::new(simulation.true_map());
 //! let mut mapping = Mapping::reference(FilterChoice::Robust)?;
@@ -34,17 +34,17 @@ use crate::graph::Graph;
 use crate::range_csv::{Ring, SONARS_MAX};
 use crate::score::{MapScore, score_map};
 
-/// Which filter maps, with the settings of the reference robot.
+/// The filter of a mapping, with the settings of the reference robot.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum FilterChoice {
-    /// The reference robot's own.
+    /// The robust filter of the reference robot.
     Robust,
-    /// The paper's, in its place.
+    /// The paper's filter.
     Paper,
 }
 
-/// The robot's stages with one filter or the other, for a ring of `SONARS`. Behind a trait object, so that who uses a mapping does not
-/// compile the filters again.
+/// The robot's stages with either filter, for a ring of `SONARS`. It is used as a trait object, so that users of a
+/// mapping do not compile the filters again.
 trait Stages<const SONARS: usize> {
     fn observe(&mut self, frame: &RingFrame<SONARS>, turn: Option<Turn>) -> Option<(Place, Update)>;
     fn map(&self) -> &Map<VERTICES>;
@@ -74,7 +74,7 @@ impl<const SONARS: usize> Stages<SONARS> for Robust<SONARS> {
     }
 }
 
-/// The stages with the paper's filter, whose particles need a log to have paths.
+/// The stages with the paper's filter, whose particles have paths only through a log.
 struct Paper<const SONARS: usize>(Box<Mapper<SONARS, VERTICES, PaperReference>>, Ancestry);
 
 impl<const SONARS: usize> Stages<SONARS> for Paper<SONARS> {
@@ -101,7 +101,7 @@ impl<const SONARS: usize> Stages<SONARS> for Paper<SONARS> {
     }
 }
 
-/// The robot's stages for a ring of `SONARS`, with the capacities of the reference robot, and their log.
+/// The robot's stages for a ring of `SONARS`, with the capacities of the reference robot, and a log of their steps.
 pub struct Mapping<const SONARS: usize> {
     stages: Box<dyn Stages<SONARS>>,
     steps: Vec<Step>,
@@ -136,8 +136,8 @@ impl<const SONARS: usize> Mapping<SONARS> {
         Ok(Self { stages, steps: Vec::new() })
     }
 
-    /// Takes one frame, and what the drive knows of how the robot left the place before; gives a step when the robot has
-    /// just been at a place.
+    /// Processes one frame and, as far as the drive knows it, how the robot left the previous place. Returns a step
+    /// when a place was detected.
     pub fn observe(&mut self, frame: &RingFrame<SONARS>, turn: Option<Turn>) -> Option<Step> {
         let (place, update) = self.stages.observe(frame, turn)?;
         let map = self.map();
@@ -156,12 +156,12 @@ impl<const SONARS: usize> Mapping<SONARS> {
         self.stages.map()
     }
 
-    /// What went wrong: in the detector and in the filter.
+    /// Fault counts of the detector and the filter.
     pub fn faults(&self) -> FaultCounters {
         self.stages.faults()
     }
 
-    /// The vertex of the best map that each place so far was taken for, by the best hypothesis of now; `None` for a place
+    /// The vertex of each place so far in the best map, according to the current best hypothesis; `None` for a place
     /// that is older than the filter's history.
     pub fn path(&self) -> Vec<Option<usize>> {
         let known = self.stages.path();
@@ -169,14 +169,14 @@ impl<const SONARS: usize> Mapping<SONARS> {
         std::iter::repeat_n(None, forgotten).chain(known.into_iter().map(Some)).collect()
     }
 
-    /// How right the best map is; see [`score_path`].
+    /// Scores the best map; see [`score_path`].
     pub fn score(&self, truth: &TrueMap, nodes: &[Option<usize>]) -> MapScore {
         score_path(self.map(), &self.path(), truth, nodes)
     }
 }
 
-/// How right a map is. `path` says for each place which vertex it was taken for, `nodes` its true node; phantoms have none and
-/// do not count. The truth is what was traversed of the true map: the nodes, and the edges between successive ones.
+/// Scores a map. `path` holds the vertex of each place, and `nodes` its true node; phantoms have none and do not count.
+/// The truth is the traversed part of the true map: the visited nodes, and the edges between successive ones.
 pub fn score_path<const V: usize>(
     map: &Map<V>,
     path: &[Option<usize>],
@@ -200,7 +200,7 @@ pub fn score_path<const V: usize>(
     score_map(&map, &path, &truth, &classes)
 }
 
-/// How right the best map of a robot is.
+/// Scores the best map of a robot.
 pub fn score_exploration(exploration: &Exploration<'_>) -> MapScore {
     let map = exploration.robot().mapper().map();
     score_path(map, &exploration.path(), exploration.rover().true_map(), exploration.nodes())

@@ -1,21 +1,21 @@
-//! One task for each of many numbers, on several threads.
+//! Runs one task for each of many numbers on several threads.
 
 use std::io;
 use std::num::NonZeroUsize;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::thread;
 
-/// Filters and priors are made on the stack, in builds without optimisation more than once.
+/// Filters and priors are constructed on the stack, in builds without optimisation more than once.
 const STACK_BYTES: usize = 64 << 20;
 
-/// The result of `task` for every number below `count`, in the order of the numbers. `threads` 0 takes as many threads as there are
-/// processors. Threads take the next number when they are done with one.
+/// Returns the result of `task` for every number below `count`, in order. `threads` 0 uses as many threads as there are
+/// processors. Each thread takes the next number when it has finished one.
 ///
 /// # Errors
 /// When a thread does not start.
 ///
 /// # Panics
-/// When a task does.
+/// When a task panics.
 pub fn map<T: Send>(count: usize, threads: usize, task: impl Fn(usize) -> T + Sync) -> io::Result<Vec<T>> {
     let threads = match threads {
         0 => thread::available_parallelism().map_or(1, NonZeroUsize::get),
@@ -49,7 +49,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn results_are_in_the_order_of_the_numbers_on_any_number_of_threads() {
+    fn results_are_in_order_for_any_number_of_threads() {
         let expected: Vec<usize> = (0..1000).map(|number| number * number).collect();
         for threads in [0, 1, 3, 2000] {
             assert_eq!(map(1000, threads, |number| number * number).unwrap(), expected);

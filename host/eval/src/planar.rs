@@ -1,24 +1,25 @@
-//! Random planar graphs: the shortest tree over random points, and short edges that cross none.
+//! Random planar graphs: the minimum spanning tree of random points, and short edges without crossings.
 
 use super::{graph::Graph, walk::PathRng};
 use rand::RngExt;
 
-/// The most edges that one vertex gets beyond its tree: as many as an observation can tell apart.
+/// Largest degree of a vertex for edges beyond the tree: the largest degree of an observation.
 const MAX_DEGREE: usize = 7;
 
 type Point = (f64, f64);
 
 /// Draws a connected planar graph with straight edges between random points of the unit square.
 ///
-/// It holds the shortest tree over the points, and then the shortest edges that cross none before them, until there
-/// are `edges`; a tree when `edges` are fewer than that needs, a triangulation when they are more than fit.
+/// It holds the minimum spanning tree of the points, and then the shortest edges that cross no earlier edge, until
+/// there are `edges`. It is a tree when `edges` is below the size of the tree, and a triangulation when more `edges` are
+/// requested than fit.
 pub(super) fn draw_planar(vertices: usize, edges: usize, rng: &mut PathRng) -> Graph {
     let points: Vec<Point> = (0..vertices).map(|_| (rng.random(), rng.random())).collect();
     let mut pairs: Vec<(usize, usize)> = (0..vertices).flat_map(|a| (a + 1..vertices).map(move |b| (a, b))).collect();
     pairs.sort_by(|&left, &right| length(&points, left).total_cmp(&length(&points, right)));
 
     let mut graph = Graph::new(vertices);
-    // The tree: no edge between vertices of one component. Shortest trees in the plane cross nowhere.
+    // The tree: no edge between vertices of one component. Minimum spanning trees in the plane have no crossings.
     let mut component: Vec<usize> = (0..vertices).collect();
     for &(a, b) in &pairs {
         let (kept, joined) = (component[a], component[b]);
@@ -63,7 +64,7 @@ mod tests {
     use crate::walk::path_rng;
 
     #[test]
-    fn edges_that_cross_are_told_from_those_that_do_not() {
+    fn crossing_edges_are_detected() {
         let points = [(0.0, 0.0), (1.0, 1.0), (0.0, 1.0), (1.0, 0.0), (3.0, 0.0)];
         assert!(cross(&points, (0, 1), (2, 3)));
         assert!(!cross(&points, (0, 2), (1, 3)));
@@ -72,7 +73,7 @@ mod tests {
     }
 
     #[test]
-    fn a_graph_is_connected_and_has_as_many_edges_as_asked_for_or_fit() {
+    fn a_graph_is_connected_and_has_the_requested_or_largest_possible_number_of_edges() {
         let mut rng = path_rng(5, 0);
         for (vertices, edges, drawn) in [(12, 15, 15..=15), (12, 3, 11..=11), (12, 99, 20..=30)] {
             for _ in 0..20 {

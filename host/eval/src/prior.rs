@@ -1,17 +1,17 @@
-//! What the filter knows of the environment before it starts (Γ_env of the paper).
+//! The prior n-grams of the environment (Γ_env of the paper).
 
 use toposlam::{Fingerprint, History, Ngram, NgramLength, NgramsFull, Prior};
 
-/// Where the n-grams of the environment come from.
+/// Source of the prior n-grams of the environment.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum PriorSource {
-    /// All n-grams of the very path that is mapped, derived before it starts: Section IV of the paper. The robust filter
+    /// All n-grams of the path that is mapped, derived before it starts: Section IV of the paper. The robust filter
     /// gets every `n` successive places of the path.
     Path,
-    /// One n-gram for every walk of `n` places of the whole environment, every reading drawn afresh: an earlier
-    /// exploration that traversed every intersection from every direction.
+    /// One n-gram for every walk of `n` places of the whole environment, with new readings: an earlier exploration that
+    /// traversed every intersection from every direction.
     Exploration,
-    /// Nothing: the n-grams grow with the path, as on a robot in an unknown building.
+    /// No prior: the n-grams grow with the path, as on a robot in an unknown building.
     None,
 }
 
@@ -26,7 +26,7 @@ impl PriorSource {
     }
 }
 
-/// How many n-grams a path of `places` places has at most, turning back anywhere included.
+/// Largest number of n-grams of a path of `places` places, with turns back at any place.
 pub fn path_ngrams(length: NgramLength, places: usize) -> usize {
     let steps = u32::from(length.get()) - 1;
     // 2^steps ways to turn from each place; a way and its reversal are one n-gram, and some ways are their own reversal.
@@ -43,7 +43,7 @@ pub fn path_prior<const V: usize, const WORDS: usize>(
     length: NgramLength,
 ) -> Result<Box<Prior<V, WORDS>>, NgramsFull> {
     let mut prior = Box::new(Prior::new(length));
-    // New n-grams reach back by at most the longest length, so the shortest ring will do.
+    // New n-grams reach back by at most the longest length, so the shortest ring is enough.
     let mut history = History::<1>::new();
     for &observation in observations {
         history.push(observation);
@@ -52,7 +52,7 @@ pub fn path_prior<const V: usize, const WORDS: usize>(
     Ok(prior)
 }
 
-/// A table of given n-grams; sequences of another length than `n` have no n-gram and are passed over.
+/// A table of given n-grams. Sequences whose length is not `n` have no n-gram and are skipped.
 ///
 /// # Errors
 /// [`NgramsFull`] when there are more different n-grams than the prior holds.
@@ -87,7 +87,7 @@ mod tests {
     }
 
     #[test]
-    fn a_path_never_has_more_ngrams_than_foretold() {
+    fn path_ngrams_is_a_tight_upper_bound() {
         let mut rng = path_rng(1, 0);
         let place = shipped("wean-surrogate-variance").places()[0];
         let observations: Vec<_> = (0..60).map(|_| observe(&place, &mut rng)).collect();

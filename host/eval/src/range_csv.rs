@@ -1,4 +1,4 @@
-//! Recorded ring ranges: a CSV file with a column for each sonar, and a TOML file that says where they look.
+//! Recorded ring ranges: a CSV file with a column for each sonar, and a TOML file with the geometry of the ring.
 
 use std::io::Read;
 
@@ -6,10 +6,10 @@ use anyhow::{Context, bail, ensure};
 use serde::Deserialize;
 use toposlam::ring::{Echo, RingFrame, RingGeometry};
 
-/// The largest ring that is replayed. The sensors of a smaller one fill the first places, the others are dead.
+/// The largest ring that can be replayed. A smaller ring fills the first positions, and the others are dead.
 pub const SONARS_MAX: usize = 32;
 
-/// The description of a ring, as it stands in a TOML file.
+/// The description of a ring in a TOML file.
 ///
 /// ```
 /// let ring = toposlam_eval::range_csv::Ring::parse(
@@ -27,24 +27,25 @@ pub const SONARS_MAX: usize = 32;
 #[derive(Clone, Debug, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Ring {
-    /// How many sonars the ring has, 3 to 32.
+    /// Number of sonars of the ring, 3 to 32.
     pub sonars: usize,
     /// The unit of the ranges.
     pub unit: Unit,
-    /// Ranges from this on mean that nothing was heard, in `unit`.
+    /// Ranges from this value on mean silence, in `unit`.
     pub max_range: f64,
     /// The CSV column of each sonar.
     pub columns: Vec<String>,
-    /// The bearing of each sonar in degrees, counter-clockwise from straight ahead. Either this …
+    /// The bearing of each sonar in degrees, counter-clockwise from straight ahead. Alternative to `first_bearing_deg` and
+    /// `step_deg`.
     #[serde(default)]
     pub bearings_deg: Vec<f64>,
-    /// … or the bearing of the first sonar …
+    /// The bearing of the first sonar in degrees, counter-clockwise from straight ahead.
     #[serde(default)]
     pub first_bearing_deg: f64,
-    /// … and the angle from each to the next, counter-clockwise positive.
+    /// The angle from each sonar to the next in degrees, counter-clockwise positive.
     #[serde(default)]
     pub step_deg: f64,
-    /// Where the ranges are measured from: the distance of a sensor to the ring's centre, in `unit`.
+    /// The distance of the sensors from the centre of the ring, in `unit`. Ranges are measured from the sensors.
     #[serde(default)]
     pub ring_radius: f64,
 }
@@ -73,10 +74,10 @@ impl Unit {
 }
 
 impl Ring {
-    /// Reads a ring's description.
+    /// Parses the description of a ring.
     ///
     /// # Errors
-    /// What is missing, unknown or out of range.
+    /// The field that is missing, unknown or out of range.
     pub fn parse(text: &str) -> anyhow::Result<Self> {
         let mut ring: Self = toml::from_str(text).context("the ring's description")?;
         ensure!((3..=SONARS_MAX).contains(&ring.sonars), "sonars must be 3 to {SONARS_MAX}, not {}", ring.sonars);
@@ -92,7 +93,7 @@ impl Ring {
         Ok(ring)
     }
 
-    /// Where the sonars look.
+    /// The geometry of the ring.
     pub fn geometry(&self) -> RingGeometry<SONARS_MAX> {
         let mut geometry = RingGeometry { bearings_mrad: [0; SONARS_MAX] };
         for (bearing_mrad, bearing_deg) in geometry.bearings_mrad.iter_mut().zip(&self.bearings_deg) {
@@ -102,7 +103,7 @@ impl Ring {
         geometry
     }
 
-    /// Reads the frames of a recording; columns that are not the ring's are ignored.
+    /// Reads the frames of a recording; other columns are ignored.
     ///
     /// An empty, negative or unreadable range is a dead sensor. A range of `max_range` or more, or infinite, is
     /// silence.
@@ -162,7 +163,7 @@ mod tests {
     }
 
     #[test]
-    fn a_recording_without_a_column_or_with_a_short_line_is_refused() {
+    fn a_recording_with_a_missing_column_or_a_short_line_is_rejected() {
         let ring = Ring::parse(FOUR).unwrap();
         assert!(ring.read("a,b,c\n1,2,3".as_bytes()).unwrap_err().to_string().contains("\"d\""));
         assert!(ring.read("a,b,c,d\n1,2,3".as_bytes()).is_err());
@@ -171,7 +172,7 @@ mod tests {
     }
 
     #[test]
-    fn a_ring_that_contradicts_itself_is_refused() {
+    fn an_inconsistent_ring_is_rejected() {
         assert!(Ring::parse(&FOUR.replace("sonars = 4", "sonars = 5")).is_err());
         assert!(Ring::parse(&FOUR.replace("sonars = 4", "sonars = 2")).is_err());
         assert!(Ring::parse(&FOUR.replace("step_deg = 90", "")).is_err());
@@ -180,7 +181,7 @@ mod tests {
     }
 
     #[test]
-    fn the_shipped_ring_looks_clockwise_from_the_front() {
+    fn the_bearings_of_the_shipped_ring_run_clockwise_from_the_front() {
         let ring = Ring::parse(include_str!("../rings/scitos-g5.toml")).unwrap();
         let bearings_mrad = ring.geometry().bearings_mrad;
         assert_eq!((bearings_mrad[0], bearings_mrad[6], bearings_mrad[23]), (0, -1571, 262));

@@ -1,4 +1,4 @@
-//! What an evaluation prints: the JSON object and the table.
+//! The output of an evaluation: the JSON object and the table.
 
 use super::{
     case::Case,
@@ -18,7 +18,7 @@ pub const BIN_MM: u16 = 20;
 pub struct Report {
     /// What holds for all rows.
     pub settings: SettingsReport,
-    /// One row for each case, filter and check point, in the order asked for.
+    /// One row for each case, filter and check point, in the requested order.
     pub rows: Vec<Row>,
 }
 
@@ -29,7 +29,7 @@ pub struct SettingsReport {
     pub seed: u64,
     /// Where the n-grams of the environment came from: `path`, `exploration` or `none`.
     pub prior: String,
-    /// What the filter was told besides fingerprints, as on the command line.
+    /// The hints besides fingerprints, as on the command line.
     pub hints: String,
     /// Refinement steps of the filter after each place.
     pub refinement_steps: u32,
@@ -39,7 +39,7 @@ pub struct SettingsReport {
     pub search_from_truth: u32,
     /// How many bits a fingerprint has.
     pub fingerprint_bits: u32,
-    /// `n`.
+    /// The length `n` of an n-gram.
     pub ngram_length: u8,
     /// The parameters of the filters that ran, by their names.
     pub filters: BTreeMap<&'static str, FilterReport>,
@@ -64,21 +64,21 @@ pub enum FilterReport {
     },
     /// Those of the robust filter.
     Robust {
-        /// How many hypotheses are kept.
+        /// Number of hypotheses.
         hypotheses: u8,
-        /// The first guess at the standard deviation of a fingerprint, in millimetres.
+        /// Initial estimate of the standard deviation of a fingerprint, in millimetres.
         noise_mm: u16,
-        /// How many repair moves are tried at each place.
+        /// Number of repair moves tried at each place.
         moves: u8,
-        /// How often the filter takes a turn for wrong, 0 to 1.
+        /// Probability of a wrong turn in the filter's model, 0 to 1.
         wrong_turn: f64,
-        /// How often the filter takes a degree for wrong, 0 to 1.
+        /// Probability of a wrong degree in the filter's model, 0 to 1.
         wrong_degree: f64,
     },
 }
 
 impl SettingsReport {
-    /// The settings of one or more evaluations that differ in their filter alone.
+    /// The settings of one or more evaluations that differ only in their filter.
     pub fn of(settings: &Settings, filters: &[Filter]) -> Self {
         Self {
             seed: settings.seed,
@@ -138,45 +138,45 @@ impl From<Filter> for FilterReport {
 pub struct Row {
     /// The name of the case: an environment, placements or a family.
     pub name: String,
-    /// How many environments it has.
+    /// Number of its environments.
     pub environments: usize,
     /// The seed they were drawn with; `null` for an environment from a file.
     pub environment_seed: Option<u64>,
     /// The filter: `paper` or `robust`.
     pub filter: &'static str,
-    /// How many paths were drawn.
+    /// Number of paths.
     pub paths: usize,
-    /// After how many places the map was judged.
+    /// Number of places after which the map was judged.
     pub length: usize,
     /// The share of maps that are exactly right.
     pub exact: f64,
-    /// The 95 % confidence interval of [`Row::exact`] (Wilson), for paths that are independent of each other; where
-    /// several paths share a random environment it is too narrow for the class of environments.
+    /// The 95 % confidence interval of [`Row::exact`] (Wilson), for independent paths. Where several paths share a
+    /// random environment, it is too narrow for the class of environments.
     pub exact_interval: [f64; 2],
-    /// The share of maps that are right but for their labels.
+    /// The share of maps that are isomorphic to the truth, regardless of labels.
     pub isomorphic: f64,
-    /// How many of the maps have this many vertices (the paper's Fig. 5).
+    /// Number of maps for each number of vertices (the paper's Fig. 5).
     pub vertices: BTreeMap<usize, usize>,
     /// The mean over paths of [`MapScore::edge_f1`](super::score::MapScore::edge_f1).
     pub edge_f1: f64,
-    /// The share of places at which the best hypothesis of that moment knew where the robot was.
+    /// The share of places at which the best hypothesis of that moment was localised.
     pub location_online: f64,
-    /// The share of places at which the path of the map at the check point is right.
+    /// The share of places that are right on the path of the map at the check point.
     pub location_smoothed: f64,
     /// The two-sided distance (Eq. 2) of the map from the n-grams of the environment.
     pub consistency_mm: Distribution<u16>,
-    /// How many of the maps have a distance from this many millimetres up to 20 more (the paper's Fig. 4); an infinite
-    /// one is in bin 65520.
+    /// Number of maps for each range of distances, 20 mm wide and named by its lower bound in millimetres (the paper's
+    /// Fig. 4); an infinite distance is in bin 65520.
     pub consistency_bins: BTreeMap<u16, usize>,
-    /// The place from which on the map was exact, up to the check point; looked at after every tenth place. Over all
+    /// The place from which on the map was exact, up to the check point, tested after every tenth place. Over all
     /// paths: `null` where the map of that path is not exact.
     pub places_until_exact: Distribution<Option<usize>>,
-    /// How many paths do not traverse every edge although their whole length asks for it.
+    /// Number of paths that do not traverse every edge although their whole length requires it.
     pub paths_not_exhaustive: usize,
-    /// How often, up to the end of the paths, a filter wanted a vertex that its map had no room for.
+    /// Number of times, up to the end of the paths, that a filter needed a new vertex and its map was full.
     pub vertices_full: u64,
-    /// The share of paths for which a long search that starts at the true path ends in another map, so that no better
-    /// search for the same score finds the truth; absent without such a search.
+    /// The share of paths for which a long search from the true path ends in another map, so that no better search for
+    /// the same score finds the truth; absent without such a search.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub limit: Option<f64>,
     /// Wall-clock time to map the n-grams of the prior, in seconds a path, on one thread; differs from run to run.
@@ -185,7 +185,7 @@ pub struct Row {
     pub seconds_per_place: f64,
 }
 
-/// Two points of a distribution over paths, each a value that occurred (nearest rank).
+/// Median and 90th percentile over paths, each a value that occurred (nearest rank).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 pub struct Distribution<T> {
     /// Half of the values are not larger.
@@ -205,7 +205,7 @@ impl<T: Ord + Copy + Default> Distribution<T> {
 }
 
 impl Distribution<Option<usize>> {
-    /// As [`Distribution::of`], with `None` for what lies beyond every number.
+    /// As [`Distribution::of`], with `None` for a value beyond every number.
     fn of_reached(values: impl Iterator<Item = Option<usize>>) -> Self {
         let Distribution { median, p90 } = Distribution::of(values.map(|value| value.unwrap_or(usize::MAX)).collect());
         let reached = |value| Some(value).filter(|&value| value != usize::MAX);
@@ -223,7 +223,7 @@ fn wilson(share: f64, count: usize) -> [f64; 2] {
     [((middle - half) / scale).max(0.0), ((middle + half) / scale).min(1.0)]
 }
 
-/// Sums up the paths of a case, a row for each check point.
+/// Summarises the paths of a case, one row for each check point.
 pub(super) fn rows(case: &Case, settings: &Settings, results: &[PathResult]) -> Vec<Row> {
     (0..settings.lengths.len()).map(|check_point| row(case, settings, results, check_point)).collect()
 }
@@ -334,13 +334,13 @@ mod tests {
     }
 
     #[test]
-    fn maps_that_never_become_exact_come_last() {
+    fn maps_that_are_never_exact_come_last() {
         let values = [None, Some(30), Some(10), Some(20)];
         assert_eq!(Distribution::of_reached(values.into_iter()), Distribution { median: Some(20), p90: None });
     }
 
     #[test]
-    fn the_interval_of_a_share_is_that_of_wilson() {
+    fn the_interval_of_a_share_is_the_wilson_interval() {
         // Published values for 0 of 10, 8 of 10 and 10 of 10.
         for (hits, low, high) in [(0.0, 0.0, 0.2775), (8.0, 0.4902, 0.9433), (10.0, 0.7225, 1.0)] {
             let [least, most] = wilson(hits / 10.0, 10);

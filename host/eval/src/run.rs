@@ -1,4 +1,4 @@
-//! Many paths through the environments of one case, in parallel, each mapped by its own filter and scored.
+//! Evaluates a filter on many paths through the environments of one case, in parallel.
 
 use super::{
     candidate::{MAX_NGRAMS, choose},
@@ -13,7 +13,7 @@ use super::{
     walk::all_walks,
 };
 
-/// The environments of a case, each with the walks whose n-grams an exploration brings.
+/// The environments of a case, each with the walks that give the n-grams of an exploration.
 pub struct Course<'a> {
     case: &'a Case,
     settings: &'a Settings,
@@ -46,9 +46,9 @@ impl<'a> Course<'a> {
     }
 }
 
-/// Evaluates a filter on all paths of a case, and gives a row for each check point.
+/// Evaluates a filter on all paths of a case and returns a row for each check point.
 ///
-/// `path_done` is called after each path, from any thread. Everything but the times depends on case and settings alone,
+/// `path_done` is called after each path, from any thread. All results but the times depend only on case and settings,
 /// not on the number of threads.
 ///
 /// # Errors

@@ -1,19 +1,19 @@
-//! How right a map is, compared with the smallest equivalent of the traversed environment.
+//! Scores a map against the smallest equivalent of the traversed environment.
 
 use super::graph::Graph;
 use std::collections::BTreeSet;
 
-/// The scores of one map. A map vertex stands for the class it was mostly visited at.
+/// The scores of one map. A map vertex represents the class at which it was mostly visited.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct MapScore {
     /// The vertices match the classes one to one and the edges are the same.
     pub exact: bool,
-    /// The map without its labels is the true graph without its labels.
+    /// The map and the true graph are isomorphic, regardless of labels.
     pub isomorphic: bool,
     /// Harmonic mean of precision and recall of the pairs of classes that the map connects: `2 c / (m + t)` with `m`
     /// pairs in the map, `t` in truth and `c` in both. A class that the map holds twice does not count against it here.
     pub edge_f1: f64,
-    /// The share of all steps at which the vertex that the path visits stands for the class the robot was at.
+    /// The share of all steps at which the visited vertex represents the class of the robot.
     pub location: f64,
 }
 
@@ -28,14 +28,13 @@ pub fn score_map(map: &Graph, path: &[usize], truth: &Graph, classes: &[usize]) 
     score_map_from(map, path, truth, classes, 0)
 }
 
-/// As [`score_map`], but the location is judged from step `first` on; the steps before only tell what the vertices stand
-/// for.
+/// As [`score_map`], but the location is judged from step `first` on; earlier steps only assign classes to vertices.
 ///
 /// # Panics
 /// As [`score_map`].
 pub fn score_map_from(map: &Graph, path: &[usize], truth: &Graph, classes: &[usize], first: usize) -> MapScore {
     let class_of_vertex = majority_classes(map.vertex_count(), truth.vertex_count(), path, classes);
-    // The image of the map's edges. A vertex that was never visited stands for nothing.
+    // The image of the map's edges. A vertex that was never visited represents no class.
     let image: BTreeSet<(usize, usize)> = map
         .edges()
         .iter()
@@ -43,7 +42,7 @@ pub fn score_map_from(map: &Graph, path: &[usize], truth: &Graph, classes: &[usi
         .map(|(a, b)| (a.min(b), a.max(b)))
         .collect();
     let hit: BTreeSet<usize> = class_of_vertex.iter().copied().flatten().collect();
-    // With as many vertices as classes, hitting every class makes the match one to one.
+    // With as many vertices as classes, a match that covers every class is one to one.
     let one_to_one = map.vertex_count() == truth.vertex_count() && hit.len() == truth.vertex_count();
     let common = image.intersection(truth.edges()).count();
     let pairs = image.len() + truth.edges().len();
@@ -58,7 +57,7 @@ pub fn score_map_from(map: &Graph, path: &[usize], truth: &Graph, classes: &[usi
     }
 }
 
-/// Whether the last vertex of a path stands for the class the robot is at, judged by the path so far alone.
+/// Whether the last vertex of a path represents the class of the robot, judged only by the path so far.
 pub fn is_localised(path: &[usize], classes: &[usize]) -> bool {
     let (Some(&vertex), Some(&class)) = (path.last(), classes.last()) else { return false };
     let class_count = classes.iter().max().map_or(0, |last| last + 1);
@@ -74,7 +73,7 @@ fn majority_classes(vertices: usize, class_count: usize, path: &[usize], classes
     visited_at.into_iter().map(|visits| most_frequent(visits.into_iter(), class_count)).collect()
 }
 
-/// The most frequent class, the lowest of several; `None` without visits.
+/// The most frequent class, the lowest one on a tie; `None` without visits.
 fn most_frequent(visits: impl Iterator<Item = usize>, class_count: usize) -> Option<usize> {
     let mut counts = vec![0_usize; class_count];
     visits.for_each(|class| counts[class] += 1);
@@ -102,7 +101,7 @@ mod tests {
     }
 
     #[test]
-    fn one_wrong_visit_costs_location_but_not_the_map() {
+    fn one_wrong_visit_lowers_the_location_score_only() {
         let score = score_map(&truth(), &[0, 1, 2, 3, 2, 0, 1, 1], &truth(), &CLASSES);
         assert_eq!(score, MapScore { exact: true, isomorphic: true, edge_f1: 1.0, location: 7.0 / 8.0 });
     }
@@ -123,16 +122,16 @@ mod tests {
     }
 
     #[test]
-    fn a_place_held_twice_is_not_exact_even_when_all_its_edges_are_right() {
-        // Vertex 4 is place 2 once more.
+    fn a_duplicate_place_is_not_exact_even_when_all_its_edges_are_right() {
+        // Vertex 4 is a duplicate of place 2.
         let map = Graph::from_edges(5, [(0, 1), (1, 2), (0, 2), (2, 3), (3, 4), (0, 4)]);
         let score = score_map(&map, &[0, 1, 2, 3, 4, 0, 1, 2], &truth(), &CLASSES);
         assert_eq!(score, MapScore { exact: false, isomorphic: false, edge_f1: 1.0, location: 1.0 });
     }
 
     #[test]
-    fn two_places_in_one_vertex_are_not_one_to_one_even_when_the_count_agrees() {
-        // Vertices 0 and 3 both stand for place 0; place 3 has no vertex of its own and is taken for place 2.
+    fn two_places_in_one_vertex_are_not_exact_even_when_the_counts_agree() {
+        // Vertices 0 and 3 both represent place 0; place 3 has no vertex of its own and shares that of place 2.
         let map = Graph::from_edges(4, [(0, 1), (1, 2), (2, 2), (2, 3), (1, 3)]);
         let score = score_map(&map, &[0, 1, 2, 2, 2, 3, 1, 2], &truth(), &CLASSES);
         assert!(!score.exact);
@@ -140,7 +139,7 @@ mod tests {
     }
 
     #[test]
-    fn steps_before_the_first_judged_one_match_vertices_but_are_not_located() {
+    fn steps_before_the_first_judged_one_only_assign_classes_to_vertices() {
         let score = score_map_from(&truth(), &[0, 1, 2, 3, 2, 0, 1, 1], &truth(), &CLASSES, 6);
         assert_eq!(score, MapScore { exact: true, isomorphic: true, edge_f1: 1.0, location: 1.0 / 2.0 });
     }

@@ -1,22 +1,22 @@
-//! What an evaluation is told: how many paths of which length, which filter, and what that knows.
+//! The settings of an evaluation: number and length of the paths, the filter, and its prior.
 
 use super::{hints::Hints, prior::PriorSource};
 use std::fmt;
 use toposlam::{ConfigError, NgramLength, PaperConfig, RobustConfig};
 
-/// What to evaluate.
+/// Settings of an evaluation.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Settings {
-    /// How many paths, 1 or more.
+    /// Number of paths, 1 or more.
     pub paths: usize,
-    /// After how many places of a path its map is judged: check points in ascending order, 1 or more. A path visits as
-    /// many places as the last one says.
+    /// The check points: the numbers of places after which the map of a path is judged, in ascending order, 1 or more.
+    /// The last one is the length of a path.
     pub lengths: Vec<usize>,
     /// The seed of walks, noise, hints and filter.
     pub seed: u64,
     /// The filter and its parameters.
     pub filter: Filter,
-    /// What the filter knows before it starts.
+    /// The prior of the filter.
     pub prior: PriorSource,
     /// Refinement steps of the filter after each place.
     pub refinement_steps: u32,
@@ -24,18 +24,18 @@ pub struct Settings {
     pub prior_refinement_steps: u32,
     /// Refinement steps of a search from the true path at each check point; 0 for no search.
     pub search_from_truth: u32,
-    /// What the filter is told besides fingerprints.
+    /// The hints besides fingerprints.
     pub hints: Hints,
-    /// How many bits a fingerprint has, 1 to 12, which is what the filter holds.
+    /// Resolution of a fingerprint in bits, 1 to 12; the filter stores 12.
     pub fingerprint_bits: u32,
-    /// `n`: how many labels an n-gram of the prior and of the judged distance has.
+    /// The length `n` of the n-grams of the prior and of the judged distance.
     pub ngram_length: NgramLength,
-    /// How many threads; 0 for as many as there are processors.
+    /// Number of threads; 0 for as many as there are processors.
     pub threads: usize,
 }
 
 impl Settings {
-    /// How many places a path visits.
+    /// Number of places of a path.
     pub fn longest(&self) -> usize {
         self.lengths.last().copied().unwrap_or(0)
     }
@@ -68,14 +68,14 @@ pub enum EvaluationError {
     Config(ConfigError),
     /// There are no paths, no environments, or no check points in ascending order.
     Nothing,
-    /// A path visits more places, those of n-grams that are mapped before it included, than the largest history holds.
+    /// A path, with the n-grams that are mapped before it, visits more places than the largest history holds.
     PathTooLong {
-        /// How many places it holds.
+        /// Capacity of the history in places.
         most: usize,
     },
     /// The path or the exploration may have more n-grams than the largest table holds.
     TooManyNgrams {
-        /// How many n-grams it holds.
+        /// Capacity of the table in n-grams.
         most: usize,
     },
     /// The threads did not start.

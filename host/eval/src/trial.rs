@@ -1,4 +1,4 @@
-//! What happens on one path, and what is true about it: the same for every filter.
+//! One path and its ground truth, the same for every filter.
 
 use super::{
     environment::Environment,
@@ -12,33 +12,33 @@ use super::{
 use rand::{Rng, seq::SliceRandom};
 use toposlam::{Fingerprint, Observation};
 
-/// A place that is visited, and what the robot tells of it.
+/// A visited place and the robot's observation of it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Visit {
     /// The index of the place.
     pub place: usize,
-    /// What the filter sees.
+    /// The input of the filter.
     pub observation: Observation,
 }
 
-/// One path. Walk, readings and hints depend on the seed and the number of the path alone, whatever the filter and the
-/// prior are.
+/// One path. Its walk, readings and hints depend only on the seed and the number of the path, not on the filter or the
+/// prior.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Trial<'a> {
-    /// Where the path is.
+    /// The environment of the path.
     pub environment: &'a Environment,
     /// Whether the path traverses every edge.
     pub exhaustive: bool,
     /// The path.
     pub visits: Vec<Visit>,
-    /// What a filter that maps the prior sees before the path: n-grams in random order, each a sequence of its own.
+    /// The n-grams that a filter maps before the path, in random order, each an independent sequence.
     pub ngrams: Vec<Vec<Visit>>,
     /// The seed of the filter.
     pub filter_seed: u64,
     knows: Knowledge,
 }
 
-/// What of its environment a filter was shown, and can be judged by.
+/// The part of its environment that a filter has observed and is judged by.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Knowledge {
     /// The part that the path has traversed so far.
@@ -49,12 +49,12 @@ enum Knowledge {
     Everything,
 }
 
-/// What a map should be.
+/// The ground truth of a map.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Truth {
-    /// The smallest equivalent of what the filter was shown.
+    /// The smallest equivalent of the observed part of the environment.
     pub graph: Graph,
-    /// The vertex of the graph that the robot was at, for every place of the n-grams that are mapped, and of the path.
+    /// The true vertex at every place of the mapped n-grams and of the path.
     pub classes: Vec<usize>,
 }
 
@@ -87,7 +87,7 @@ impl<'a> Trial<'a> {
         };
         ngrams.shuffle(&mut rng);
         let knows = match (settings.filter, settings.prior) {
-            // The map of the paper's filter grows with the path alone.
+            // The map of the paper's filter grows only with the path.
             (Filter::Paper(_), _) | (Filter::Robust(_), PriorSource::None) => Knowledge::SoFar,
             (Filter::Robust(_), PriorSource::Path) => Knowledge::WholePath,
             (Filter::Robust(_), PriorSource::Exploration) => Knowledge::Everything,
@@ -100,7 +100,7 @@ impl<'a> Trial<'a> {
         if self.knows == Knowledge::SoFar { &[] } else { &self.ngrams }
     }
 
-    /// How many places there are in [`Trial::mapped_before`].
+    /// Number of places in [`Trial::mapped_before`].
     pub fn places_before(&self) -> usize {
         self.mapped_before().iter().map(Vec::len).sum()
     }
@@ -115,14 +115,13 @@ impl<'a> Trial<'a> {
         };
         let before = self.mapped_before().iter().flatten().map(|visit| visit.place);
         let visited = before.chain(walk[..steps].iter().copied());
-        // What was shown to the filter contains what was visited.
+        // The observed part contains every visited place.
         let classes = visited.filter_map(|place| class_of_place[place]).collect();
         Truth { graph, classes }
     }
 }
 
-/// Visits as a sequence of their own: nothing is said of how the robot came to the first place, nor of turns before the
-/// third.
+/// Visits as an independent sequence: the first place has no predecessor, and turns start at the third place.
 fn begin(mut visits: Vec<Visit>) -> Vec<Visit> {
     visits.iter_mut().take(2).for_each(|visit| visit.observation.turn = None);
     visits.iter_mut().take(1).for_each(|visit| visit.observation.starts_sequence = true);
@@ -158,7 +157,7 @@ mod tests {
     }
 
     #[test]
-    fn a_path_is_the_same_whatever_the_filter_prior_and_hints_are() {
+    fn a_path_does_not_depend_on_filter_prior_or_hints() {
         let environment = environment();
         let walks = all_walks(&environment, 5, 1000).unwrap();
         let fingerprints = |settings: &Settings| {
@@ -181,7 +180,7 @@ mod tests {
     }
 
     #[test]
-    fn n_grams_are_sequences_of_their_own_in_another_order_on_each_path() {
+    fn n_grams_are_independent_sequences_in_a_different_order_on_each_path() {
         let environment = environment();
         let walks = all_walks(&environment, 5, 1000).unwrap();
         for (prior, count) in [(PriorSource::None, 0), (PriorSource::Path, 36), (PriorSource::Exploration, 287)] {
@@ -207,7 +206,7 @@ mod tests {
     }
 
     #[test]
-    fn the_truth_is_what_the_filter_was_shown() {
+    fn the_truth_is_the_part_that_the_filter_observed() {
         let environment = environment();
         let walks = all_walks(&environment, 5, 1000).unwrap();
         let truth = |settings: &Settings| Trial::draw(&environment, &walks, settings, 3).truth(12);

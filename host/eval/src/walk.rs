@@ -7,22 +7,22 @@ use rand_xoshiro::{SplitMix64, Xoshiro256PlusPlus};
 use std::collections::BTreeSet;
 use toposlam::Fingerprint;
 
-/// From this many places on, a walk is drawn again until it traverses every edge.
+/// Walks of this many places or more are redrawn until they traverse every edge.
 pub const EXHAUSTIVE_FROM_LENGTH: usize = 100;
-/// How often a walk is drawn at most before its last version is kept as it is.
+/// Largest number of draws of a walk; the last one is kept as it is.
 pub const MAX_DRAWS: usize = 1000;
 
-/// The random numbers of one path.
+/// The random number generator of one path.
 pub type PathRng = Xoshiro256PlusPlus;
 
-/// The generator of path number `path`. It depends on nothing else than the two arguments, so that paths can be
-/// evaluated in any order and on any number of threads.
+/// The generator of path number `path`. It depends only on the two arguments, so that paths can be evaluated in any
+/// order and on any number of threads.
 pub fn path_rng(seed: u64, path: u64) -> PathRng {
     let mut mixed_seed = SplitMix64::seed_from_u64(seed);
     PathRng::seed_from_u64(mixed_seed.next_u64().wrapping_add(path))
 }
 
-/// The places a robot visits, and whether it came by every edge.
+/// The places that a robot visits, and whether it traversed every edge.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Walk {
     /// The visited places by index, in order.
@@ -31,11 +31,10 @@ pub struct Walk {
     pub exhaustive: bool,
 }
 
-/// Draws a walk of `length` places: a uniform start, then uniform steps to a neighbour, back to where the robot came
-/// from included.
+/// Draws a walk of `length` places: a uniform start, then uniform steps to a neighbour, turns back included.
 ///
-/// From [`EXHAUSTIVE_FROM_LENGTH`] places on, walks that miss an edge are drawn again, up to [`MAX_DRAWS`] walks in all;
-/// the last one is then kept and says that it is not exhaustive.
+/// Walks of [`EXHAUSTIVE_FROM_LENGTH`] places or more that miss an edge are redrawn, up to [`MAX_DRAWS`] walks in all.
+/// The last one is then kept and marked as not exhaustive.
 pub fn draw_walk(environment: &Environment, length: usize, rng: &mut PathRng) -> Walk {
     let draws = if length >= EXHAUSTIVE_FROM_LENGTH { MAX_DRAWS } else { 1 };
     let mut walk = draw_once(environment, length, rng);
@@ -63,7 +62,7 @@ fn draw_once(environment: &Environment, length: usize, rng: &mut PathRng) -> Wal
     Walk { places, exhaustive: traversed.len() == environment.graph().edges().len() }
 }
 
-/// Draws one fingerprint of a place: Gaussian, clamped to what a fingerprint can hold, rounded to its step.
+/// Draws one fingerprint of a place: Gaussian, clamped to the range of a fingerprint, rounded to its step.
 pub fn observe(place: &Place, rng: &mut PathRng) -> Fingerprint {
     // An environment holds no deviation that the distribution refuses; the mean is then the only sensible reading.
     let radius_mm = Normal::new(place.mean_mm, place.sd_mm).map_or(place.mean_mm, |noise| noise.sample(rng));
@@ -72,8 +71,8 @@ pub fn observe(place: &Place, rng: &mut PathRng) -> Fingerprint {
     Fingerprint::from_steps(steps.round() as u16).unwrap_or(Fingerprint::MAX)
 }
 
-/// A fingerprint as a sensor of `bits` bits would give it: the nearest of 2^`bits` levels from 0 to 8188 mm. From 12 bits
-/// on nothing changes.
+/// A fingerprint with a resolution of `bits` bits: the nearest of 2^`bits` levels from 0 to 8188 mm. From 12 bits on it
+/// is unchanged.
 pub fn quantise(fingerprint: Fingerprint, bits: u32) -> Fingerprint {
     if bits >= Fingerprint::BITS {
         return fingerprint;
@@ -137,7 +136,7 @@ mod tests {
     }
 
     #[test]
-    fn a_walk_that_cannot_be_exhaustive_is_kept_and_says_so() {
+    fn a_walk_that_cannot_be_exhaustive_is_marked_as_such() {
         let ids = 0..300;
         let places = ids.clone().map(|id| Place { id, mean_mm: 900.0, sd_mm: 20.0 }).collect();
         let edges: Vec<_> = ids.skip(1).map(|id| [id - 1, id]).collect();

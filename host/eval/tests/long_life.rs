@@ -1,4 +1,4 @@
-//! A robot lives for hours in a simulated building, with faults of every kind and an operator who never leaves it alone.
+//! Runs a robot in a simulated building for hours, with faults of every kind and a permanently active operator.
 
 use toposlam::FaultKind;
 use toposlam::drive::VelocityCommand;
@@ -9,7 +9,7 @@ use toposlam_sim::exploration::Exploration;
 use toposlam_sim::injector::FaultRates;
 use toposlam_sim::world::{Plan, RobotModel};
 
-/// 24 hours take half a minute in release; `.ci/run` lets `toposlam soak` do them.
+/// 24 hours take half a minute in release; `.ci/run` runs them with `toposlam soak`.
 const HOURS: u64 = 2;
 
 fn life(rates: FaultRates, hours: u64) -> Life {
@@ -20,7 +20,7 @@ fn life(rates: FaultRates, hours: u64) -> Life {
 }
 
 #[test]
-fn with_faults_no_turn_and_no_place_is_lost_and_every_fault_is_counted() {
+fn faults_lose_no_turn_and_no_place_and_every_fault_is_counted() {
     let life = life(FaultRates::scaled(0.01), HOURS);
     assert_eq!(life.mistakes(), [""; 0]);
     assert!(life.places > 80 * HOURS, "{} places", life.places);
@@ -34,7 +34,7 @@ fn with_faults_no_turn_and_no_place_is_lost_and_every_fault_is_counted() {
 }
 
 #[test]
-fn without_faults_an_operator_costs_the_robot_nothing() {
+fn an_operator_without_faults_does_not_degrade_the_map() {
     let life = life(FaultRates::NONE, 1);
     assert_eq!(life.mistakes(), [""; 0]);
     assert!(life.score.exact && life.phantoms == 0 && life.bumps == 0);
@@ -42,13 +42,13 @@ fn without_faults_an_operator_costs_the_robot_nothing() {
 }
 
 #[test]
-fn a_robot_whose_sonars_and_line_are_nearly_useless_still_turns_and_counts() {
+fn extreme_fault_rates_lose_no_turn_and_every_fault_is_counted() {
     let life = life(FaultRates::scaled(0.5), 1);
     assert_eq!(life.mistakes(), [""; 0]);
 }
 
 #[test]
-fn the_same_life_twice_is_the_same() {
+fn a_run_is_reproducible() {
     let [once, again] = [0, 1].map(|_| {
         let life = life(FaultRates::scaled(0.02), 1);
         (life.lines(), life.faults)
@@ -57,7 +57,7 @@ fn the_same_life_twice_is_the_same() {
 }
 
 #[test]
-fn a_robot_that_hears_nothing_stands_and_goes_on_when_it_hears_again() {
+fn a_robot_stops_while_all_sonars_are_dead_and_then_resumes() {
     let plan = Plan::built_in("office").unwrap();
     let mut buffer = [0; SNAPSHOT_BYTES];
     let mut exploration = Exploration::start(&plan, RobotModel::default(), 1, &mut buffer).unwrap();

@@ -1,11 +1,11 @@
-//! A whole robot in a simulated building: it drives where its own code says, and what it finds is held to the truth.
+//! A complete robot that explores a simulated building, and the ground truth of its drive.
 //!
 //! ```
 //! use toposlam::reference::SNAPSHOT_BYTES;
 //! use toposlam_sim::exploration::Exploration;
 //! use toposlam_sim::world::{Plan, RobotModel};
 //!
-//! let plan = Plan::built_in("flat").expect("it is built in");
+//! let plan = Plan::built_in("flat").expect("a built-in plan");
 //! let mut buffer = [0; SNAPSHOT_BYTES];
 //! let mut exploration = Exploration::start(&plan, RobotModel::default(), 1, &mut buffer)?;
 //! while exploration.places() < 3 {
@@ -29,23 +29,24 @@ use crate::Step;
 use crate::injector::{FaultRates, LineInjector, RingInjector};
 use crate::world::{BodyModel, GroundTruth, Plan, RobotModel, Rover, VoronoiError};
 
-/// How long a ring frame lasts on the simulated board, in milliseconds.
+/// Duration of a ring frame on the simulated board, in milliseconds.
 const FRAME_MS: u32 = 100;
 
-/// A board in memory: what it receives and sends are queues, its flash keeps the last snapshot, and its clock is set from outside.
+/// A board in memory: its serial line is a pair of queues, its flash holds the last snapshot, and its clock is set from
+/// outside.
 #[derive(Clone, Debug, Default)]
 pub struct MemoryBoard {
     /// Bytes on their way to the robot.
     pub received: VecDeque<u8>,
     /// Bytes that the robot has sent.
     pub sent: Vec<u8>,
-    /// Where the wheels are set to go.
+    /// The last velocity command.
     pub velocity: VelocityCommand,
-    /// The time since the start.
+    /// Time since the start, in milliseconds.
     pub now_ms: u32,
     /// The newest snapshot.
     pub kept: Vec<u8>,
-    /// How often the watchdog was fed.
+    /// Number of times that the watchdog was fed.
     pub fed: u64,
 }
 
@@ -81,7 +82,7 @@ impl Board for MemoryBoard {
     }
 }
 
-/// A robot, its world, and a log of how the two compare.
+/// A robot, its world and the ground truth of its drive.
 pub struct Exploration<'buffer> {
     rover: Rover,
     robot: Box<ReferenceRobot<'buffer>>,
@@ -89,28 +90,28 @@ pub struct Exploration<'buffer> {
     encoder: Encoder,
     requests: u16,
     ring_faults: FaultCounters,
-    /// What changes the frames and the received bytes, when faults are wanted.
+    /// The fault injectors of the frames and the received bytes, when faults are enabled.
     injectors: Option<(RingInjector, LineInjector)>,
     ground_truth: GroundTruth,
     nodes: Vec<Option<usize>>,
     steps: Vec<Step>,
     frames: u64,
-    /// Frames while the robot paused: its detector does not number them.
+    /// Number of frames during pauses, which the detector does not number.
     frames_not_taken: u32,
 }
 
 impl<'buffer> Exploration<'buffer> {
-    /// Puts the reference robot on the plan's start. `buffer` is for its snapshots.
+    /// Places the reference robot at the start of the plan. `buffer` holds its snapshots.
     ///
     /// # Errors
     /// When the plan has no true map.
     ///
     /// # Panics
-    /// Never: the reference robot's settings are sound.
+    /// Never: the settings of the reference robot are valid.
     pub fn start(plan: &Plan, model: RobotModel, seed: u64, buffer: &'buffer mut [u8]) -> Result<Self, VoronoiError> {
         let rover = Rover::new(plan, model, BodyModel::default(), seed)?;
         let mut robot = Box::new(ReferenceRobot::new());
-        robot.start(&ROBOT, buffer).expect("the reference robot's settings are sound");
+        robot.start(&ROBOT, buffer).expect("the reference robot's settings are valid");
         let ground_truth = GroundTruth::new(rover.true_map());
         Ok(Self {
             rover,
@@ -128,19 +129,19 @@ impl<'buffer> Exploration<'buffer> {
         })
     }
 
-    /// Lets faults happen in [`Exploration::advance`] from now on.
+    /// Enables faults in [`Exploration::advance`].
     pub fn set_faults(&mut self, rates: FaultRates, seed: u64) {
         self.injectors = Some((RingInjector::new(rates, seed), LineInjector::new(rates, seed)));
     }
 
-    /// The world's next frame. [`Exploration::map`] is to follow.
+    /// Returns the next frame of the world. [`Exploration::map`] must follow.
     pub fn frame(&mut self) -> RingFrame<SONARS> {
         let (frame, truth) = self.rover.frame();
         self.ground_truth.drive(&truth);
         frame
     }
 
-    /// One turn of the robot's main loop with a frame, which a fault may have changed.
+    /// Runs one turn of the robot's main loop with a frame, which a fault may have changed.
     pub fn map(&mut self, frame: &RingFrame<SONARS>) -> Seen {
         self.board.now_ms = self.board.now_ms.wrapping_add(FRAME_MS);
         self.frames += 1;
@@ -156,18 +157,18 @@ impl<'buffer> Exploration<'buffer> {
         seen
     }
 
-    /// Notes a place that another robot in this world has found, in the world's frame with that number.
+    /// Logs a place that another robot detected in this world. The place counts frames as this world does.
     pub fn note(&mut self, place: &Place) {
         self.nodes.push(self.ground_truth.detect(place).node);
     }
 
-    /// Drives on as far as until the next frame.
+    /// Drives until the next frame.
     pub fn drive(&mut self, velocity: VelocityCommand) {
         self.rover.follow(velocity);
     }
 
-    /// All of it: a frame, a turn of the robot's main loop, and the way to the next frame. What the robot says meanwhile is
-    /// what its board then has sent.
+    /// Takes a frame, runs one turn of the robot's main loop and drives to the next frame. Afterwards, the board holds
+    /// the bytes that the robot sent in this turn.
     pub fn advance(&mut self) -> Seen {
         self.board.sent.clear();
         let mut frame = self.frame();
@@ -182,7 +183,7 @@ impl<'buffer> Exploration<'buffer> {
         seen
     }
 
-    /// Sends the robot a command over its line.
+    /// Sends the robot a command over its serial line.
     pub fn command(&mut self, command: toposlam::wire::Command) {
         self.requests = self.requests.wrapping_add(1);
         let mut buffer = [0; MAX_FRAME_BYTES];
@@ -192,7 +193,7 @@ impl<'buffer> Exploration<'buffer> {
         self.board.received.extend(bytes);
     }
 
-    /// Whether the robot was told to go to a vertex and is not there yet.
+    /// Whether the robot has a goal vertex that it has not reached.
     pub fn is_underway(&self) -> bool {
         let drive = self.robot.drive();
         matches!(drive.goal(), Goal::Vertex(_)) && drive.goal_status() == toposlam::drive::GoalStatus::Active
@@ -203,7 +204,7 @@ impl<'buffer> Exploration<'buffer> {
         &self.robot
     }
 
-    /// The robot, to be restored or started anew.
+    /// The robot, for restoring or restarting it.
     pub const fn robot_mut(&mut self) -> &mut ReferenceRobot<'buffer> {
         &mut self.robot
     }
@@ -213,7 +214,7 @@ impl<'buffer> Exploration<'buffer> {
         &mut self.board
     }
 
-    /// The faults of its ring so far, to be counted up by who makes them.
+    /// The fault counters of the ring, for an external source of faults.
     pub const fn ring_faults(&mut self) -> &mut FaultCounters {
         &mut self.ring_faults
     }
@@ -228,12 +229,12 @@ impl<'buffer> Exploration<'buffer> {
         &self.ground_truth
     }
 
-    /// How many places it has found.
+    /// Number of places detected so far.
     pub fn places(&self) -> usize {
         self.nodes.len()
     }
 
-    /// How many ring frames it has taken.
+    /// Number of ring frames processed so far.
     pub const fn frames(&self) -> u64 {
         self.frames
     }
@@ -243,22 +244,22 @@ impl<'buffer> Exploration<'buffer> {
         &self.nodes
     }
 
-    /// What each place brought.
+    /// One step for each place.
     pub fn steps(&self) -> &[Step] {
         &self.steps
     }
 
-    /// Every fault so far.
+    /// Counts of all faults so far.
     pub fn faults(&self) -> FaultCounters {
         self.robot.faults(&self.ring_faults)
     }
 
-    /// How often the drive lost its way.
+    /// Number of times that the drive lost its way.
     pub fn times_lost(&self) -> u32 {
         self.robot.drive().faults().count(FaultKind::DriveLost)
     }
 
-    /// The vertex that the best map takes each place for; `None` for a place that the history has forgotten.
+    /// The vertex of each place in the best map; `None` for a place that has left the history.
     pub fn path(&self) -> Vec<Option<usize>> {
         let known: Vec<usize> = self.robot.mapper().filter().path().map(usize::from).collect();
         let forgotten = self.nodes.len().saturating_sub(known.len());

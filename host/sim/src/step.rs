@@ -1,18 +1,18 @@
-//! One place on a robot's drive, and what its filter made of it.
+//! A detected place and the filter's update for it.
 
 use toposlam::Update;
 use toposlam::place::Place;
 
-/// What one place brought.
+/// One detected place and its effect on the map.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Step {
-    /// The place as the detector saw it.
+    /// The place that the detector reported.
     pub place: Place,
-    /// What the filter made of it.
+    /// The filter's update for the place.
     pub update: Update,
-    /// How many vertices the best map has now.
+    /// Number of vertices of the best map after the update.
     pub vertices: u8,
-    /// How many edges the best map has now.
+    /// Number of edges of the best map after the update.
     pub edges: usize,
 }
 

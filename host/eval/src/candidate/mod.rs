@@ -1,4 +1,5 @@
-//! The filters that can be evaluated, behind one interface, with capacities of which each is a few seconds of compiling.
+//! The filters that can be evaluated, behind one interface, with few sets of capacities, because each takes seconds to
+//! compile.
 
 mod paper;
 mod robust;
@@ -12,37 +13,37 @@ use super::{
 };
 use toposlam::{ConfigError, Map, NgramLength, Observation, VertexId};
 
-/// How many vertices a map can have: what a row of the adjacency matrix holds. Faults count the maps that were full.
+/// Largest number of vertices of a map: the width of a row of the adjacency matrix. Fault counters count full maps.
 pub const VERTICES: usize = 64;
-/// How many hypotheses, or particles, a filter can have.
+/// Largest number of hypotheses or particles of a filter.
 pub const MAX_HYPOTHESES: usize = 100;
-/// How many n-grams a prior can hold.
+/// Largest number of n-grams of a prior.
 pub const MAX_NGRAMS: usize = 8192;
 
-/// A filter on its way along one path.
+/// A filter that maps one path.
 pub trait Candidate {
-    /// Takes the next place.
+    /// Processes the next place.
     fn observe(&mut self, observation: Observation);
     /// Runs `steps` refinement steps.
     fn refine(&mut self, steps: u32);
-    /// Map and path at the end of a search of `steps` refinement steps from a path, given as a vertex for each place so far.
-    /// `None` for a filter that does not search.
+    /// Map and path after a search of `steps` refinement steps from a path, given as a vertex for each place so far.
+    /// `None` for a filter without a search.
     fn search_from(&self, path: &[VertexId], steps: u32) -> Option<(Map<VERTICES>, Vec<usize>)>;
     /// The best map.
     fn map(&self) -> Map<VERTICES>;
-    /// The vertex of the best map that each of the newest `places` places is taken for, the oldest first.
+    /// The vertex of each of the newest `places` places in the best map, the oldest first.
     fn path(&self, places: usize) -> Vec<usize>;
-    /// How often the filter wanted a vertex that its map had no room for.
+    /// Number of times that the filter needed a new vertex and its map was full.
     fn vertices_full(&self) -> u32;
 }
 
 /// Starts a filter for one path.
 pub type Start = fn(&Settings, &Trial) -> Box<dyn Candidate>;
 
-/// Chooses the filter that the settings ask for. `explored` is how many n-grams an exploration brings.
+/// Chooses the filter of the settings. `explored` is the number of n-grams of an exploration.
 ///
 /// # Errors
-/// [`EvaluationError`] when a parameter is out of its range, or the largest capacities do not do.
+/// [`EvaluationError`] when a parameter is out of its range, or the largest capacities are too small.
 pub fn choose(settings: &Settings, explored: usize) -> Result<Start, EvaluationError> {
     let length = settings.ngram_length;
     let ngrams = match settings.prior {
@@ -56,7 +57,7 @@ pub fn choose(settings: &Settings, explored: usize) -> Result<Start, EvaluationE
     match settings.filter {
         Filter::Paper(config) => {
             config.check(MAX_HYPOTHESES).map_err(EvaluationError::Config)?;
-            // What is judged and what the filter uses are n-grams of one length.
+            // The judged distance and the filter use n-grams of one length.
             if NgramLength::new(config.ngram_length) != Ok(length) {
                 let (value, wanted) = (config.ngram_length.into(), length.get() as i32);
                 let error = ConfigError::OutOfRange { field: "ngram_length", value, min: wanted, max: wanted };

@@ -11,7 +11,7 @@ use std::ptr;
 use toposlam::Filter as _;
 use toposlam::{FaultKind, Fingerprint, Map, Observation, PaperConfig, PaperFilter, Prior, VertexId};
 
-/// How many places a path can visit without a prior.
+/// Largest number of places of a path without a prior.
 pub(super) const MAX_PLACES: usize = 2048;
 
 pub(super) fn choose(settings: &Settings, ngrams: usize) -> Result<Start, EvaluationError> {
@@ -59,7 +59,7 @@ impl<const WORDS: usize> Particles<WORDS> {
     }
 }
 
-/// Without a prior: the n-grams are those of the path so far.
+/// The filter without a prior: the n-grams are those of the path so far.
 struct Online<const WORDS: usize>(Particles<WORDS>);
 
 impl<const WORDS: usize> Online<WORDS> {
@@ -93,7 +93,7 @@ impl<const WORDS: usize> Candidate for Online<WORDS> {
     }
 }
 
-/// With a prior. The filter then does not look at its own history, so the shortest will do.
+/// The filter with a prior. It does not use its own history, so the shortest one is enough.
 struct Informed<const WORDS: usize> {
     particles: Particles<1>,
     prior: Box<Prior<VERTICES, WORDS>>,
@@ -130,7 +130,7 @@ impl<const WORDS: usize> Candidate for Informed<WORDS> {
     }
 }
 
-/// The n-grams of a trial's prior as a table with room for them.
+/// The n-grams of a trial's prior, in a table that has room for them.
 pub(crate) fn prior<const WORDS: usize>(settings: &Settings, trial: &Trial) -> Box<Prior<VERTICES, WORDS>> {
     let fingerprint = |visit: &crate::trial::Visit| visit.observation.fingerprint;
     let prior = if settings.prior == PriorSource::Path {

@@ -8,13 +8,13 @@ use crate::{
 use toposlam::Filter as _;
 use toposlam::{FaultKind, Fingerprint, Map, Observation, RobustConfig, RobustFilter, VertexId};
 
-/// How many vertices a map of the robust filter can have.
+/// Largest number of vertices of a map of the robust filter.
 const ROBUST_VERTICES: usize = 32;
-/// How many places the n-grams of the prior and the path can have together.
+/// Largest number of places of the prior's n-grams and the path together.
 const MAX_HISTORY: usize = 16384;
 
-/// `places` is how many places the n-grams and the path have together. Each filter here takes seconds to compile, so there is one
-/// for the usual case and one for the largest.
+/// `places` is the number of places of the n-grams and the path together. Each filter takes seconds to compile, so
+/// there is one for the usual case and one for the largest.
 pub(super) fn choose(hypotheses: usize, places: usize) -> Result<Start, EvaluationError> {
     match (hypotheses, places) {
         (0..=10, 0..=512) => Ok(Robust::<10, 512>::start),

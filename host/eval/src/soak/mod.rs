@@ -1,14 +1,14 @@
-//! A long life in little time: a robot drives through a simulated building for hours, with faults on its ring and its line and an
-//! operator who tells it something all the time; everything is deterministic.
+//! A long simulated run: a robot drives through a building for hours, with faults on its ring and its line and an
+//! operator who sends commands all the time. The run is deterministic.
 //!
-//! What the robot says of its faults is held to what was done to it, see [`Account`].
+//! The fault counts of the robot are compared with the injected faults, see [`Account`].
 //!
 //! ```
 //! use toposlam_sim::injector::FaultRates;
 //! use toposlam_eval::soak::Soak;
 //! use toposlam_sim::world::{Plan, RobotModel};
 //!
-//! let plan = Plan::built_in("office").expect("it is built in");
+//! let plan = Plan::built_in("office").expect("a built-in plan");
 //! let soak = Soak { model: RobotModel::default(), rates: FaultRates::scaled(0.01), seed: 1, turns: 1000 };
 //! let life = soak.run(&plan)?;
 //! assert_eq!(life.watchdog_fed, 1000);
@@ -35,10 +35,10 @@ use toposlam_sim::world::{Plan, RobotModel, VoronoiError};
 
 pub use operator::OperatorCounts;
 
-/// Turns of the robot's loop in a simulated hour.
+/// Turns of the robot's main loop in a simulated hour.
 pub const TURNS_PER_HOUR: u64 = 36_000;
 
-/// How long a robot is to live, and what is to happen to it.
+/// Robot, faults, seed and duration of a run.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Soak {
     /// Its sonars and their noise.
@@ -47,11 +47,11 @@ pub struct Soak {
     pub rates: FaultRates,
     /// The seed of the world and of the faults.
     pub seed: u64,
-    /// Turns of its loop, ten in a second.
+    /// Turns of the robot's main loop, ten in a second.
     pub turns: u64,
 }
 
-/// What the robot must have counted, reckoned from what was done to it.
+/// The expected fault counts of the robot, derived from the injected faults.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Account {
     /// Lost answers.
@@ -62,13 +62,13 @@ pub struct Account {
     pub sonar_out_of_range: u64,
     /// Mapped frames with too few live sonars.
     pub ring_blind: u64,
-    /// What a decoder of the same bytes takes for no request.
+    /// Corrupt requests, as counted by a decoder of the same bytes.
     pub wire_corrupt: u64,
     /// Requests beyond one in a turn, and turns with too many bytes.
     pub command_flood: u64,
-    /// Requests that the robot's replies refuse.
+    /// Requests that the robot's replies reject.
     pub command_refused: u64,
-    /// Places beyond the room of the history; the filter counts its faults from the last restored snapshot on.
+    /// Places beyond the capacity of the history. The filter counts its faults from the last restored snapshot on.
     pub history_full: u64,
 }
 
@@ -87,41 +87,41 @@ impl Account {
     }
 }
 
-/// What became of it.
+/// The results of a run.
 #[derive(Clone, Debug)]
 pub struct Life {
-    /// Turns of the robot's loop.
+    /// Turns of the robot's main loop.
     pub turns: u64,
-    /// How often the watchdog was fed.
+    /// Number of times that the watchdog was fed.
     pub watchdog_fed: u64,
-    /// Places that were reported.
+    /// Reported places.
     pub places: u64,
-    /// Places that the filter has taken in.
+    /// Places that the filter has processed.
     pub observed: u64,
-    /// Places whose number was not the one after the last.
+    /// Places whose number does not follow that of the previous place.
     pub out_of_order: u64,
-    /// Snapshots that went to the flash.
+    /// Snapshots stored in the flash.
     pub kept: u64,
-    /// What was done to the ring.
+    /// Faults injected into the ring.
     pub ring: RingCounts,
-    /// What was done to the line, to the robot and from it.
+    /// Faults injected into the line, to the robot and from it.
     pub lines: [LineCounts; 2],
-    /// What the operator did.
+    /// Actions of the operator.
     pub operator: OperatorCounts,
-    /// The faults that the robot has counted.
+    /// Fault counts of the robot.
     pub faults: FaultCounters,
-    /// Those that it must have counted.
+    /// Expected fault counts of the robot.
     pub account: Account,
-    /// How right the map is at the end.
+    /// Score of the final map.
     pub score: MapScore,
     /// Phantoms among the places.
     pub phantoms: u64,
-    /// In how many frames a wall stopped the robot.
+    /// Number of frames in which a wall stopped the robot.
     pub bumps: u32,
 }
 
 impl Soak {
-    /// Lets the robot live.
+    /// Runs the simulation.
     ///
     /// # Errors
     /// When the plan has no true map.
@@ -188,21 +188,21 @@ impl Soak {
     }
 }
 
-/// Keeps the account, with the robot's bytes and frames and nothing else of it.
+/// Derives the expected fault counts, only from the robot's bytes and frames.
 #[derive(Default)]
 struct Auditor {
     account: Account,
     arriving: Decoder<Request>,
     departing: Decoder,
-    /// The number of the request that was answered last.
+    /// The number of the last answered request.
     replied: Option<u16>,
     is_paused: bool,
-    /// How many places there were when a snapshot was restored the last time.
+    /// Number of places at the last restore of a snapshot.
     restored_at: u64,
 }
 
 impl Auditor {
-    /// Bytes that the robot will find when its turn comes.
+    /// Processes bytes that the robot finds in its next turn.
     fn arrive(&mut self, bytes: &[u8]) {
         let looked_at = usize::from(Inbox::BYTES_PER_TURN);
         self.account.command_flood += u64::from(bytes.len() > looked_at);
@@ -224,12 +224,12 @@ impl Auditor {
         }
     }
 
-    /// What the robot said in its turn, after so many places.
+    /// Processes the bytes that the robot sent in its turn, after `places` places.
     fn depart(&mut self, bytes: &[u8], operator: &Operator, places: u64) {
         let Self { account, departing, replied, is_paused, restored_at, .. } = self;
         each(departing, bytes, |message| {
             let Message::Reply(reply) = message else { return };
-            // A request that came again is answered again, and not executed.
+            // A repeated request is answered again, but not executed.
             let is_executed = replied.replace(reply.request) != Some(reply.request);
             account.command_refused += u64::from(is_executed && matches!(reply.outcome, Outcome::Refused(_)));
             match operator.awaits(reply.request) {
@@ -240,7 +240,7 @@ impl Auditor {
         });
     }
 
-    /// The frame of the turn. A command is executed before the frame is mapped.
+    /// Processes the frame of the turn. A command is executed before the frame is mapped.
     fn map(&mut self, frame: &RingFrame<SONARS>) {
         if self.is_paused {
             return;
@@ -254,7 +254,7 @@ impl Auditor {
     }
 }
 
-/// Hands on every message among the bytes of a line.
+/// Passes every message among the bytes of a line to `take`.
 fn each<M: Payload>(decoder: &mut Decoder<M>, bytes: &[u8], mut take: impl FnMut(M)) {
     let mut rest = bytes;
     loop {
@@ -270,7 +270,7 @@ fn each<M: Payload>(decoder: &mut Decoder<M>, bytes: &[u8], mut take: impl FnMut
 }
 
 impl Life {
-    /// What must not have happened, in words; nothing when all is well.
+    /// The violated expectations in words; empty when there are none.
     pub fn mistakes(&self) -> Vec<String> {
         let mut mistakes = Vec::new();
         let mut hold = |holds: bool, mistake: String| {
@@ -292,7 +292,7 @@ impl Life {
         mistakes
     }
 
-    /// All of it, a line for each subject.
+    /// A summary, one line for each subject.
     pub fn lines(&self) -> Vec<String> {
         let [to_robot, from_robot] = self.lines;
         let OperatorCounts { answered, refused, repeated, restored } = self.operator;

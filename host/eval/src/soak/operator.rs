@@ -1,32 +1,32 @@
-//! Who sits at the other end of a robot's line: tells it what to do, all day long, and repeats what was not answered.
+//! The operator at the other end of a robot's line, who sends commands all the time and repeats unanswered requests.
 
 use std::collections::VecDeque;
 
 use toposlam::wire::{CHUNK_BYTES, Chunk, Command, Encoder, MAX_FRAME_BYTES, Outcome, Reply, Request, Setting, crc32};
 
-/// A request that was not answered within so many turns of the robot's loop is sent again.
+/// Turns of the robot's loop after which an unanswered request is repeated.
 const PATIENCE_TURNS: u32 = 3;
-/// Between two tasks, in turns: five minutes.
+/// Interval between two tasks, in turns: five minutes.
 const TURNS_BETWEEN_TASKS: u64 = 3000;
-/// So long a robot that was told to pause does so at least, in turns.
+/// Shortest duration of a pause, in turns.
 const PAUSE_TURNS: u64 = 50;
-/// An operator's requests have numbers below this.
+/// Requests of an operator have numbers below this.
 const LAST_ID: u16 = 0x7FFF;
 
-/// What an operator did.
+/// Counts of the operator's actions.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct OperatorCounts {
-    /// Requests that were answered.
+    /// Answered requests.
     pub answered: u64,
-    /// Those among them that were refused.
+    /// Rejected requests among them.
     pub refused: u64,
-    /// How often a request was sent again.
+    /// Repetitions of a request.
     pub repeated: u64,
     /// Snapshots that were fetched and restored.
     pub restored: u64,
 }
 
-/// An operator with one request under way at most.
+/// An operator with at most one pending request.
 pub(super) struct Operator {
     encoder: Encoder,
     id: u16,
@@ -53,7 +53,8 @@ impl Operator {
         }
     }
 
-    /// Once in each turn of the robot's loop: the bytes to be sent. `vertices` is the size of the robot's map.
+    /// Returns the bytes to send; called once in each turn of the robot's loop. `vertices` is the size of the robot's
+    /// map.
     pub(super) fn turn(&mut self, turn: u64, vertices: u8) -> Vec<u8> {
         if turn.is_multiple_of(TURNS_BETWEEN_TASKS) && self.todo.is_empty() && self.sent.is_none() {
             self.set_task(vertices);
@@ -76,12 +77,12 @@ impl Operator {
         }
         let Some((request, _)) = &self.sent else { return Vec::new() };
         let mut frame = [0; MAX_FRAME_BYTES];
-        // A buffer of that size is always enough. The zero before it ends what noise has begun.
+        // A buffer of that size is always enough. The zero before it terminates a frame that noise has begun.
         let frame = self.encoder.encode(request, &mut frame).unwrap_or(&[]);
         [&[0], frame].concat()
     }
 
-    /// The next of all the things that a robot can be told to do.
+    /// Sets the next task; the tasks cover all commands of a robot.
     fn set_task(&mut self, vertices: u8) {
         self.tasks += 1;
         let round = self.tasks / 9;
@@ -99,12 +100,12 @@ impl Operator {
         });
     }
 
-    /// The command that was sent under a number and is not answered yet.
+    /// The pending command with this number.
     pub(super) fn awaits(&self, id: u16) -> Option<Command> {
         self.sent.filter(|(request, _)| request.id == id).map(|(request, _)| request.command)
     }
 
-    /// Takes a reply.
+    /// Processes a reply.
     pub(super) fn hear(&mut self, reply: &Reply, turn: u64) {
         let Some(command) = self.awaits(reply.request) else { return };
         self.sent = None;
@@ -118,14 +119,14 @@ impl Operator {
                 let next = self.snapshot.len() as u16;
                 if next < total { self.todo.push_back(Command::GetSnapshot { offset: next }) } else { self.send_back() }
             }
-            // Another snapshot was taken meanwhile, or none could be.
+            // Another snapshot was taken in the meantime, or none could be taken.
             (Command::GetSnapshot { .. }, _) => self.todo.push_back(Command::Pause { on: false }),
             (Command::RestoreCommit, Outcome::Done) => self.counts.restored += 1,
             _ => {}
         }
     }
 
-    /// Restores the snapshot that was fetched. The robot has been pausing since, so that it loses no place.
+    /// Restores the fetched snapshot. The robot has paused since the fetch, so that it loses no place.
     fn send_back(&mut self) {
         let length = self.snapshot.len() as u16;
         self.todo.push_back(Command::RestoreBegin { length, crc: crc32(&self.snapshot) });

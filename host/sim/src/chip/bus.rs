@@ -1,15 +1,15 @@
-//! The I2C bus of the models: what devices say to transfers, with or without a bridge in between.
+//! The I2C bus of the models: the answers of devices to transfers, with or without a bridge in between.
 
 use embedded_hal::i2c::{ErrorKind, ErrorType, I2c, NoAcknowledgeSource, Operation};
 
-/// What a device on the bus says to a transfer.
+/// The answer of a device to a transfer.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum BusAnswer<DATA> {
-    /// It took or gave the data.
+    /// The device accepted or returned the data.
     Acknowledged(DATA),
-    /// No device has that address, or it keeps silent.
+    /// No device acknowledged the address.
     AddressNotAcknowledged,
-    /// The device refused a byte.
+    /// The device did not acknowledge a data byte.
     DataNotAcknowledged,
     /// The bus is stuck.
     TimedOut,
@@ -30,14 +30,14 @@ impl<DATA> BusAnswer<DATA> {
 pub trait I2cDevices {
     /// A write to a 7-bit address.
     fn write(&mut self, address: u8, bytes: &[u8]) -> BusAnswer<()>;
-    /// A read of some bytes from a 7-bit address.
+    /// A read of `count` bytes from a 7-bit address.
     fn read(&mut self, address: u8, count: usize) -> BusAnswer<Vec<u8>>;
 }
 
-/// Devices on the controller's own I2C bus, as a driver sees them. It takes one operation as one run on the bus.
+/// Devices on the controller's own I2C bus, as a driver sees them. Each operation is one transfer on the bus.
 #[derive(Clone, Debug)]
 pub struct I2cBus<DEVICES> {
-    /// What is on the bus.
+    /// The devices on the bus.
     pub devices: DEVICES,
 }
 

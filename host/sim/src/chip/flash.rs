@@ -1,42 +1,43 @@
-//! A model of a NOR flash whose power can be cut at any operation, also in the middle of one.
+//! A model of a NOR flash with power cuts, between operations and in the middle of one.
 //!
-//! What `embedded-storage` says of a power cut is what it does: of the words that were being written any bit may be written or
-//! not, of the sector that was being erased any bit may be erased or not, and everything else is as it was.
+//! A power cut follows the contract of `embedded-storage`. In a word that is being written, each bit may be written or
+//! not. In a sector that is being erased, each bit may be erased or not. Everything else is unchanged.
 
 use embedded_storage::nor_flash::{ErrorType, NorFlash, NorFlashError, NorFlashErrorKind, ReadNorFlash};
 
-/// In which state the operation is left in which the power is cut.
+/// State in which a power cut leaves the interrupted operation.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Tear {
-    /// It is done.
+    /// The operation is complete.
     Done,
-    /// The first half of its bytes is done.
+    /// The first half of its bytes is complete.
     FirstHalf,
-    /// The last half of its bytes is done.
+    /// The last half of its bytes is complete.
     LastHalf,
-    /// Each bit is done or not, drawn with this seed.
+    /// Each bit is complete or not, drawn with this seed.
     Bits(u64),
 }
 
 /// A power cut.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Cut {
-    /// In which operation, counted from 0 since the flash was made: each write, and each sector of an erase, is one.
+    /// Index of the interrupted operation, counted from 0 for a new flash. Each write, and each sector of an erase, is
+    /// one.
     pub operation: u64,
-    /// How that is left.
+    /// State in which that operation is left.
     pub tear: Tear,
 }
 
-/// What a flash refuses.
+/// Errors of the flash.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum FlashFault {
-    /// There is no power.
+    /// The power is off.
     NoPower,
     /// The address or the length is not a multiple of the unit.
     NotAligned,
-    /// The address is behind the end.
+    /// The address is beyond the end.
     OutOfBounds,
-    /// A word was written already.
+    /// A word is already written.
     NotErased,
 }
 
@@ -50,8 +51,8 @@ impl NorFlashError for FlashFault {
     }
 }
 
-/// A flash that is written in words of `WRITE` bytes, each once unless it is [rewritable](FlashModel::rewritable), and erased in
-/// sectors of `ERASE` bytes.
+/// A flash that is written in words of `WRITE` bytes and erased in sectors of `ERASE` bytes. Each word is written once
+/// between erases, unless the flash is [rewritable](FlashModel::rewritable).
 #[derive(Clone, Debug)]
 pub struct FlashModel<const WRITE: usize, const ERASE: usize> {
     bytes: Vec<u8>,
@@ -64,7 +65,7 @@ pub struct FlashModel<const WRITE: usize, const ERASE: usize> {
 }
 
 impl<const WRITE: usize, const ERASE: usize> FlashModel<WRITE, ERASE> {
-    /// An erased flash of so many sectors.
+    /// An erased flash with this number of sectors.
     pub fn new(sectors: usize) -> Self {
         Self {
             bytes: vec![0xFF; sectors * ERASE],
@@ -77,49 +78,49 @@ impl<const WRITE: usize, const ERASE: usize> FlashModel<WRITE, ERASE> {
         }
     }
 
-    /// The same flash, where a word may be written again as long as that only clears bits.
+    /// The same flash, where a word may be written again as long as the write only clears bits.
     #[must_use]
     pub fn rewritable(self) -> Self {
         Self { is_rewritable: true, ..self }
     }
 
-    /// Sets when the power is cut.
+    /// Schedules a power cut, or cancels it.
     pub fn cut_power(&mut self, cut: Option<Cut>) {
         self.cut = cut;
     }
 
-    /// Whether the power was cut.
+    /// Whether the power is off.
     pub fn is_off(&self) -> bool {
         !self.has_power
     }
 
-    /// Gives power again, and no cut is set.
+    /// Restores the power and cancels the scheduled cut.
     pub fn power_on(&mut self) {
         self.has_power = true;
         self.cut = None;
     }
 
-    /// How many operations there were.
+    /// Number of operations so far.
     pub fn operations(&self) -> u64 {
         self.operations
     }
 
-    /// How many bytes were written.
+    /// Number of bytes written so far.
     pub fn bytes_written(&self) -> u64 {
         self.bytes_written
     }
 
-    /// How often each sector was erased.
+    /// Number of erases of each sector.
     pub fn erases(&self) -> &[u32] {
         &self.erases
     }
 
-    /// What is in the flash, to be damaged by a test.
+    /// The contents of the flash, for tests that corrupt them.
     pub fn bytes_mut(&mut self) -> &mut [u8] {
         &mut self.bytes
     }
 
-    /// Begins an operation; tells how it is left if the power is cut in it.
+    /// Begins an operation; returns its tear if the power is cut during it.
     fn begin(&mut self) -> Result<Option<Tear>, FlashFault> {
         if !self.has_power {
             return Err(FlashFault::NoPower);
@@ -131,7 +132,8 @@ impl<const WRITE: usize, const ERASE: usize> FlashModel<WRITE, ERASE> {
         Ok(tear)
     }
 
-    /// Carries out an operation on the bytes from an address on: each becomes what `wanted` says, as far as the tear lets it.
+    /// Applies an operation from an address on. Each byte becomes the value that `wanted` gives, as far as the tear
+    /// allows.
     fn carry_out(&mut self, from: usize, wanted: &[u8], tear: Option<Tear>) -> Result<(), FlashFault> {
         let half = wanted.len() / 2;
         let mut state = match tear {
@@ -218,7 +220,7 @@ mod tests {
     type Small = FlashModel<4, 64>;
 
     #[test]
-    fn a_word_is_written_once_between_two_erases_and_in_its_alignment() {
+    fn a_word_is_written_aligned_and_once_between_erases() {
         let mut flash = Small::new(2);
         flash.write(4, &[1, 2, 3, 4]).unwrap();
         assert_eq!(flash.write(4, &[0; 4]), Err(FlashFault::NotErased));
@@ -238,7 +240,7 @@ mod tests {
     }
 
     #[test]
-    fn a_cut_leaves_its_operation_in_the_middle_and_nothing_works_until_there_is_power() {
+    fn a_power_cut_tears_its_operation_and_later_operations_fail_until_power_on() {
         for (tear, written) in [
             (Tear::Done, [0; 8]),
             (Tear::FirstHalf, [0, 0, 0, 0, 0xFF, 0xFF, 0xFF, 0xFF]),

@@ -1,4 +1,4 @@
-//! A model of a bank of HC-SR04 rangers: their pins, in simulated time, in a world of ring frames.
+//! A model of a bank of HC-SR04 rangers: their pins in simulated time, in a world of ring frames.
 
 use std::{cell::RefCell, fmt, rc::Rc};
 
@@ -11,24 +11,24 @@ use super::{
 };
 
 const SHORTEST_TRIGGER_NS: u64 = 10_000;
-/// From the end of the trigger to the rise of the echo line.
+/// Delay from the end of the trigger to the rising edge of the echo line.
 const RISE_NS: u64 = 450_000;
 const NO_ECHO_NS: u64 = 38_000_000;
-/// Less than an echo from 20 mm.
+/// Shorter than an echo from 20 mm.
 const SPIKE_NS: u64 = 50_000;
 
-/// A defect that a test gives a sensor.
+/// A fault that a test injects into a sensor.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum HcSr04Fault {
     /// Its echo line never rises.
     NeverRises,
-    /// Once risen, its echo line stays high for ever.
+    /// Its echo line rises and then stays high.
     NeverFalls,
-    /// Its echo line is high whatever happens.
+    /// Its echo line is always high.
     HeldHigh,
     /// It answers with a pulse of 50 µs.
     Spike,
-    /// It takes 200 ms to give up, as some clones do, and has nothing to hear.
+    /// It receives no echo and times out after 200 ms, as some clones do.
     GivesUpLate,
     /// Its echo pin cannot be read.
     EchoPinBroken,
@@ -36,7 +36,7 @@ pub enum HcSr04Fault {
     TriggerPinBroken,
 }
 
-/// A pin that failed.
+/// The error of a failed pin.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct PinBroken;
 
@@ -54,7 +54,7 @@ impl Error for PinBroken {
     }
 }
 
-/// The rangers; [`pins`](Self::pins) are what a driver gets.
+/// The rangers. [`pins`](Self::pins) returns the pins for a driver.
 #[derive(Debug)]
 pub struct HcSr04Bank<WORLD, const SONARS: usize> {
     state: Rc<RefCell<State<WORLD, SONARS>>>,
@@ -76,7 +76,7 @@ struct Sensor {
 }
 
 impl<WORLD: FnMut() -> Option<RingFrame<SONARS>>, const SONARS: usize> HcSr04Bank<WORLD, SONARS> {
-    /// Rangers in a world.
+    /// A bank of rangers in a world.
     pub fn new(world: WORLD, time: SimulatedTime) -> Self {
         let sensors = [Sensor::default(); SONARS];
         let state = State { surroundings: Surroundings::new(world), time, sensors, ignored_triggers: 0 };
@@ -90,17 +90,17 @@ impl<WORLD: FnMut() -> Option<RingFrame<SONARS>>, const SONARS: usize> HcSr04Ban
         })
     }
 
-    /// Gives a sensor a defect, or heals it.
+    /// Injects a fault into a sensor, or clears it.
     pub fn set_fault(&self, sensor: usize, fault: Option<HcSr04Fault>) {
         self.state.borrow_mut().sensors[sensor].fault = fault;
     }
 
-    /// Whether neighbours that listen at the same time hear each other: then both report the shorter range.
+    /// Enables cross-talk: neighbours that listen at the same time both report the shorter range.
     pub fn set_cross_talk(&self, cross_talk: bool) {
         self.state.borrow_mut().surroundings.cross_talk = cross_talk;
     }
 
-    /// How many trigger pulses were too short, or came while the echo line was high.
+    /// Number of trigger pulses that were too short, or came while the echo line was high.
     pub fn ignored_triggers(&self) -> u32 {
         self.state.borrow().ignored_triggers
     }
@@ -119,7 +119,7 @@ impl<WORLD: FnMut() -> Option<RingFrame<SONARS>>, const SONARS: usize> State<WOR
         self.sensors[sensor].echo_rises_ns = Some(now_ns + RISE_NS);
     }
 
-    /// When the pulse of a sensor begins and ends.
+    /// Start and end of a sensor's echo pulse.
     fn pulse_ns(&self, sensor: usize) -> Option<(u64, u64)> {
         let rises_ns = self.sensors[sensor].echo_rises_ns?;
         let length_ns = match (self.sensors[sensor].fault, self.surroundings.heard(sensor)) {
@@ -144,7 +144,7 @@ impl<WORLD: FnMut() -> Option<RingFrame<SONARS>>, const SONARS: usize> State<WOR
     }
 }
 
-/// A sensor's input.
+/// The trigger input of a sensor.
 #[derive(Debug)]
 pub struct TriggerPin<WORLD, const SONARS: usize> {
     state: Rc<RefCell<State<WORLD, SONARS>>>,
@@ -181,7 +181,7 @@ impl<WORLD: FnMut() -> Option<RingFrame<SONARS>>, const SONARS: usize> OutputPin
     }
 }
 
-/// A sensor's output.
+/// The echo output of a sensor.
 #[derive(Debug)]
 pub struct EchoPin<WORLD, const SONARS: usize> {
     state: Rc<RefCell<State<WORLD, SONARS>>>,

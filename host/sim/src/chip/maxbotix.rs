@@ -1,4 +1,4 @@
-//! A model of a bank of MaxBotix I2CXL-MaxSonar rangers that stand in a world of ring frames.
+//! A model of a bank of MaxBotix I2CXL-MaxSonar rangers in a world of ring frames.
 
 use toposlam::ring::{Echo, RingFrame};
 
@@ -6,14 +6,14 @@ use super::{BusAnswer, I2cDevices, SensorFault, SimulatedTime, surroundings::Sur
 
 const FIRST_ADDRESS: u8 = 0x70;
 const TAKE_A_RANGE: u8 = 81;
-/// A ranging at full range, somewhat less than the 80 ms after which one should read.
+/// Duration of a ranging at full range, somewhat less than the recommended 80 ms before a read.
 const RANGING_NS: u64 = 78_000_000;
 const PART_INFORMATION: u16 = 0x1202;
 const NEAREST_CM: u16 = 20;
 const NOTHING_HEARD_CM: u16 = 765;
 
-/// Rangers at 0x70 and upwards at first, on a bus with simulated time. The world is a source of ring frames: a new frame
-/// begins when a ranger fires that has fired in the present one already.
+/// Rangers on a bus with simulated time, initially at addresses from 0x70 on. The world is a source of ring frames: a
+/// new frame begins when a ranger fires that has already fired in the current one.
 #[derive(Debug)]
 pub struct MaxBotixBank<WORLD, const SONARS: usize> {
     surroundings: Surroundings<WORLD, SONARS>,
@@ -30,19 +30,19 @@ struct Sensor {
 }
 
 impl<WORLD: FnMut() -> Option<RingFrame<SONARS>>, const SONARS: usize> MaxBotixBank<WORLD, SONARS> {
-    /// Rangers in a world.
+    /// A bank of rangers in a world.
     pub fn new(world: WORLD, time: SimulatedTime) -> Self {
         let sensors =
             std::array::from_fn(|index| Sensor { fault: None, address: FIRST_ADDRESS + index as u8, done_ns: None });
         Self { surroundings: Surroundings::new(world), time, sensors }
     }
 
-    /// Gives a sensor a defect, or heals it.
+    /// Injects a fault into a sensor, or clears it.
     pub fn set_fault(&mut self, sensor: usize, fault: Option<SensorFault>) {
         self.sensors[sensor].fault = fault;
     }
 
-    /// Whether neighbours that range at the same time hear each other: then both report the shorter range.
+    /// Enables cross-talk: neighbours that range at the same time both report the shorter range.
     pub fn set_cross_talk(&mut self, cross_talk: bool) {
         self.surroundings.cross_talk = cross_talk;
     }
@@ -52,7 +52,7 @@ impl<WORLD: FnMut() -> Option<RingFrame<SONARS>>, const SONARS: usize> MaxBotixB
         self.sensors[sensor].address
     }
 
-    /// Puts a sensor at another 7-bit address, as if it came from elsewhere.
+    /// Sets the 7-bit address of a sensor, as if it was configured elsewhere.
     pub fn set_address(&mut self, sensor: usize, address: u8) {
         self.sensors[sensor].address = address;
     }
@@ -66,7 +66,7 @@ impl<WORLD: FnMut() -> Option<RingFrame<SONARS>>, const SONARS: usize> MaxBotixB
         self.sensors[index].fault == Some(SensorFault::Absent) || self.surroundings.is_dead(index)
     }
 
-    /// The sensor with an address; of several, one that is there.
+    /// The sensor with an address; if several share it, one that is present.
     fn index_of(&self, address: u8) -> Option<usize> {
         let mut with_address = (0..SONARS).filter(|&index| self.sensors[index].address == address);
         let first = with_address.clone().next();
@@ -74,7 +74,7 @@ impl<WORLD: FnMut() -> Option<RingFrame<SONARS>>, const SONARS: usize> MaxBotixB
     }
 }
 
-/// What a sensor says of what it hears.
+/// The range that a sensor reports for an echo, in centimetres.
 fn range_cm(heard: Echo) -> u16 {
     match heard {
         Echo::Range { range_mm } => ((range_mm + 5) / 10).clamp(NEAREST_CM, NOTHING_HEARD_CM),
@@ -89,7 +89,7 @@ impl<WORLD: FnMut() -> Option<RingFrame<SONARS>>, const SONARS: usize> I2cDevice
             return BusAnswer::AddressNotAcknowledged;
         }
         if *bytes == [TAKE_A_RANGE] {
-            // The sound starts with the frame whether or not this sensor takes part in it.
+            // The frame begins whether or not this sensor fires in it.
             let listening = std::array::from_fn(|sensor| self.is_ranging(sensor));
             self.surroundings.fire(std::array::from_fn(|sensor| sensor == index), listening);
         }

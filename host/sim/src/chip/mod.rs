@@ -1,10 +1,10 @@
-//! Behavioural models of the sensors, of the chips between them and the controller, and of its flash, for the emulator and for
-//! tests.
+//! Behavioural models of the sensors, of the bridge between them and the controller, and of the flash, for the emulator
+//! and for tests.
 //!
-//! [`Sc18im700`] takes the bytes that the firmware sends and gives back the bytes that the real chip would; behind it, or on
-//! an [`I2cBus`] of the controller's own, [`Srf08Bank`] and [`MaxBotixBank`] answer for rangers. [`HcSr04Bank`] moves the
-//! pins of its rangers. All of them stand in a world of ring frames; [`SimulatedTime`] is the time of those that need one.
-//! [`FlashModel`] is a NOR flash whose power can be cut at any operation.
+//! [`Sc18im700`] takes the bytes that the firmware sends and returns the bytes that the real chip would return.
+//! [`Srf08Bank`] and [`MaxBotixBank`] are rangers behind the bridge, or on an [`I2cBus`] of the controller's own.
+//! [`HcSr04Bank`] drives the pins of its rangers. All rangers measure a world of ring frames; [`SimulatedTime`] is the
+//! clock of those that need one. [`FlashModel`] is a NOR flash whose power can be cut at any operation.
 
 mod bus;
 mod flash;
@@ -23,19 +23,19 @@ pub use sc18im700::Sc18im700;
 pub use srf08::Srf08Bank;
 pub use time::SimulatedTime;
 
-/// A defect that a test gives a sensor on an I2C bus.
+/// A fault that a test injects into a sensor on an I2C bus.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum SensorFault {
     /// It does not acknowledge its address.
     Absent,
-    /// It acknowledges and ranges for ever.
+    /// It acknowledges its address and never finishes ranging.
     NeverDone,
-    /// It answers 0, whatever is there.
+    /// It always reports 0.
     Zeros,
-    /// It answers 65,535.
+    /// It always reports 65,535.
     OutOfRange,
-    /// It refuses the data that is written to it.
+    /// It does not acknowledge the data of a write.
     RefusesData,
-    /// It blocks the bus whenever it is read.
+    /// It blocks the bus on every read.
     BlocksBus,
 }

@@ -1,7 +1,8 @@
-//! A model of the SC18IM700 UART-to-I2C bridge: a byte in, bytes out.
+//! A model of the SC18IM700 UART-to-I2C bridge: one byte in, the answer bytes out.
 //!
-//! It follows the data sheet's message format (see the driver in `toposlam::ring::drivers`), not any driver: messages may be cut
-//! anywhere, registers hold what was written to them, unknown commands are ignored as the chip does.
+//! It follows the message format of the data sheet (see the driver in `toposlam::ring::drivers`), not any driver.
+//! Messages may be split anywhere, registers hold the values written to them, and unknown commands are ignored as on
+//! the chip.
 
 use std::mem;
 
@@ -10,11 +11,11 @@ use super::{BusAnswer, I2cDevices};
 /// The chip, with the devices on its bus.
 #[derive(Debug)]
 pub struct Sc18im700<DEVICES> {
-    /// What is behind the bridge.
+    /// The devices behind the bridge.
     pub devices: DEVICES,
     registers: [u8; 11],
     state: State,
-    /// A transfer failed: the rest of its message up to the stop is not put on the bus.
+    /// A transfer failed: the rest of its message up to the stop does not reach the bus.
     failed: bool,
     replies: Vec<u8>,
 }
@@ -43,13 +44,13 @@ impl<DEVICES: I2cDevices> Sc18im700<DEVICES> {
         Self { devices, registers, state: State::Idle, failed: false, replies: Vec::new() }
     }
 
-    /// Takes one byte from the UART and gives what the chip answers to it, mostly nothing.
+    /// Takes one byte from the UART and returns the chip's answer, which is mostly empty.
     pub fn byte(&mut self, byte: u8) -> Vec<u8> {
         self.state = self.next(byte);
         if matches!(self.state, State::Idle) { mem::take(&mut self.replies) } else { Vec::new() }
     }
 
-    /// The line speed that the registers ask for.
+    /// The baud rate that the registers select.
     pub fn baud_rate(&self) -> u32 {
         7_372_800 / (16 + u32::from(u16::from_le_bytes([self.registers[0], self.registers[1]])))
     }
@@ -151,7 +152,7 @@ impl<DEVICES: I2cDevices> Sc18im700<DEVICES> {
 mod tests {
     use super::*;
 
-    /// One device at 0x48 that remembers what was written to it and gives it back.
+    /// A device at 0x48 that stores the bytes written to it and returns them.
     struct Echoes(Vec<u8>);
 
     impl I2cDevices for Echoes {
@@ -171,30 +172,30 @@ mod tests {
         }
     }
 
-    fn say(chip: &mut Sc18im700<Echoes>, bytes: &[u8]) -> Vec<u8> {
+    fn exchange(chip: &mut Sc18im700<Echoes>, bytes: &[u8]) -> Vec<u8> {
         bytes.iter().flat_map(|&byte| chip.byte(byte)).collect()
     }
 
     #[test]
     fn a_write_and_a_read_with_repeated_start_reach_the_device_at_the_stop() {
         let mut chip = Sc18im700::new(Echoes(Vec::new()));
-        assert_eq!(say(&mut chip, b"S\x90\x02\x50\x53S\x91\x03"), b"");
-        assert_eq!(say(&mut chip, b"P"), b"\x50\x53\x50");
-        assert_eq!(say(&mut chip, b"R\x0AP"), [0xF0]);
+        assert_eq!(exchange(&mut chip, b"S\x90\x02\x50\x53S\x91\x03"), b"");
+        assert_eq!(exchange(&mut chip, b"P"), b"\x50\x53\x50");
+        assert_eq!(exchange(&mut chip, b"R\x0AP"), [0xF0]);
     }
 
     #[test]
-    fn an_absent_device_shows_in_the_status_and_sends_no_data() {
+    fn an_absent_device_sets_the_status_and_returns_no_data() {
         let mut chip = Sc18im700::new(Echoes(Vec::new()));
-        assert_eq!(say(&mut chip, b"S\x20\x01\x00S\x21\x04P"), b"");
-        assert_eq!(say(&mut chip, b"R\x0A\x06P"), [0xF1, 0x26]);
+        assert_eq!(exchange(&mut chip, b"S\x20\x01\x00S\x21\x04P"), b"");
+        assert_eq!(exchange(&mut chip, b"R\x0A\x06P"), [0xF1, 0x26]);
     }
 
     #[test]
     fn the_baud_rate_registers_follow_the_data_sheets_formula() {
         let mut chip = Sc18im700::new(Echoes(Vec::new()));
         assert_eq!(chip.baud_rate(), 9600);
-        say(&mut chip, b"W\x00\x30\x01\x00P");
+        exchange(&mut chip, b"W\x00\x30\x01\x00P");
         assert_eq!(chip.baud_rate(), 115_200);
     }
 }

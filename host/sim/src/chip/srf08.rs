@@ -1,4 +1,4 @@
-//! A model of sixteen SRF08 or SRF10 rangers that stand in a world of ring frames.
+//! A model of sixteen SRF08 or SRF10 rangers in a world of ring frames.
 
 use toposlam::ring::{Echo, RingFrame};
 
@@ -10,15 +10,15 @@ use super::{
 const SENSORS: usize = 16;
 const FIRST_ADDRESS: u8 = 0x70;
 const REVISION: u8 = 6;
-/// What comes before a new address.
+/// The commands that must precede a new address.
 const UNLOCKING: [u8; 3] = [0xA0, 0xAA, 0xA5];
 
-/// Sixteen rangers, at 0x70 to 0x7F at first. The world is a source of ring frames: a new frame begins when a ranger fires
-/// that has fired in the present one already.
+/// Sixteen rangers, initially at addresses 0x70 to 0x7F. The world is a source of ring frames: a new frame begins when
+/// a ranger fires that has already fired in the current one.
 #[derive(Debug)]
 pub struct Srf08Bank<WORLD> {
     surroundings: Surroundings<WORLD, SENSORS>,
-    /// How often a ranging sensor is asked before it is done.
+    /// Number of polls before a ranging sensor is done.
     ranging_polls: u32,
     is_srf10: bool,
     sensors: [Sensor; SENSORS],
@@ -28,31 +28,32 @@ pub struct Srf08Bank<WORLD> {
 struct Sensor {
     fault: Option<SensorFault>,
     address: u8,
-    /// How many commands of [`UNLOCKING`] it has seen in a row.
+    /// Number of commands of [`UNLOCKING`] received in a row.
     unlocked: usize,
-    /// How often it still reads as ranging.
+    /// Number of polls for which it still reads as ranging.
     polls_left: u32,
     pointer: usize,
 }
 
 impl<WORLD: FnMut() -> Option<RingFrame<SENSORS>>> Srf08Bank<WORLD> {
-    /// SRF08 in a world. `ranging_polls` stands for the 65 ms of a ranging: so often a sensor reads as still ranging.
+    /// A bank of SRF08 in a world. `ranging_polls` stands for the 65 ms of a ranging: a sensor reads as ranging for
+    /// this number of polls.
     pub fn new(world: WORLD, ranging_polls: u32) -> Self {
         let sensors = std::array::from_fn(|index| Sensor { address: FIRST_ADDRESS + index as u8, ..Sensor::default() });
         Self { surroundings: Surroundings::new(world), ranging_polls, is_srf10: false, sensors }
     }
 
-    /// The same with SRF10: four registers, silent on the bus while they range, deaf to the general call.
+    /// A bank of SRF10 in a world: four registers, no answer on the bus while ranging, no general call.
     pub fn srf10(world: WORLD, ranging_polls: u32) -> Self {
         Self { is_srf10: true, ..Self::new(world, ranging_polls) }
     }
 
-    /// Gives a sensor a defect, or heals it.
+    /// Injects a fault into a sensor, or clears it.
     pub fn set_fault(&mut self, sensor: usize, fault: Option<SensorFault>) {
         self.sensors[sensor].fault = fault;
     }
 
-    /// Whether neighbours that range at the same time hear each other: then both report the shorter range.
+    /// Enables cross-talk: neighbours that range at the same time both report the shorter range.
     pub fn set_cross_talk(&mut self, cross_talk: bool) {
         self.surroundings.cross_talk = cross_talk;
     }
@@ -62,17 +63,17 @@ impl<WORLD: FnMut() -> Option<RingFrame<SENSORS>>> Srf08Bank<WORLD> {
         self.sensors[sensor].address
     }
 
-    /// Puts a sensor at another 7-bit address, as if it came from elsewhere.
+    /// Sets the 7-bit address of a sensor, as if it was configured elsewhere.
     pub fn set_address(&mut self, sensor: usize, address: u8) {
         self.sensors[sensor].address = address;
     }
 
-    /// How many frames the world has given so far.
+    /// Number of frames read from the world.
     pub fn frames(&self) -> u64 {
         self.surroundings.frames
     }
 
-    /// How often the ring was fired after the world had no more frames; every sensor is absent then.
+    /// Number of times that the ring fired after the last frame of the world; every sensor is absent then.
     pub fn blind_frames(&self) -> u64 {
         self.surroundings.blind_frames
     }
@@ -89,7 +90,7 @@ impl<WORLD: FnMut() -> Option<RingFrame<SENSORS>>> Srf08Bank<WORLD> {
         self.sensors[index].fault == Some(SensorFault::Absent) || self.surroundings.is_dead(index)
     }
 
-    /// The sensor with an address; of several, one that is there.
+    /// The sensor with an address; if several share it, one that is present.
     fn index_of(&self, address: u8) -> Option<usize> {
         let mut with_address = (0..SENSORS).filter(|&index| self.sensors[index].address == address);
         let first = with_address.clone().next();
@@ -128,7 +129,7 @@ impl<WORLD: FnMut() -> Option<RingFrame<SENSORS>>> I2cDevices for Srf08Bank<WORL
             return BusAnswer::AddressNotAcknowledged;
         }
         if is_ranging {
-            // The sound starts with the frame whether or not this sensor takes part in it.
+            // The frame begins whether or not this sensor fires in it.
             self.fire(|sensor| sensor == index);
         }
         if self.is_absent(index) {
@@ -171,7 +172,7 @@ impl<WORLD: FnMut() -> Option<RingFrame<SENSORS>>> I2cDevices for Srf08Bank<WORL
             (_, Echo::Silence | Echo::Dead) => 0,
         };
         let [high, low] = echo_us.to_be_bytes();
-        // Only the first of the SRF08's seventeen echoes is ever there.
+        // The model provides only the first of the SRF08's seventeen echoes.
         let registers = if self.is_srf10 {
             vec![REVISION, 0x80, high, low]
         } else {

@@ -1,12 +1,12 @@
-//! What modelled rangers stand in: a world of ring frames, and who hears whose sound.
+//! The surroundings of the modelled rangers: a world of ring frames, and the cross-talk between rangers.
 
 use toposlam::ring::{Echo, RingFrame};
 
-/// A source of ring frames. A frame begins when a ranger fires that has fired in the present one already.
+/// A source of ring frames. A frame begins when a ranger fires that has already fired in the current one.
 #[derive(Debug)]
 pub(super) struct Surroundings<WORLD, const SONARS: usize> {
     world: WORLD,
-    /// Whether neighbours that listen at the same time hear each other's sound.
+    /// Whether neighbours that listen at the same time receive each other's pulse.
     pub(super) cross_talk: bool,
     pub(super) frames: u64,
     pub(super) blind_frames: u64,
@@ -28,7 +28,7 @@ impl<WORLD: FnMut() -> Option<RingFrame<SONARS>>, const SONARS: usize> Surroundi
         }
     }
 
-    /// Some rangers send their sound at the same moment, while others listen for theirs still.
+    /// Fires some rangers at the same moment, while others are still listening.
     pub(super) fn fire(&mut self, who: [bool; SONARS], listening: [bool; SONARS]) {
         if (0..SONARS).any(|sensor| who[sensor] && self.fired[sensor]) {
             self.fired = [false; SONARS];
@@ -54,12 +54,12 @@ impl<WORLD: FnMut() -> Option<RingFrame<SONARS>>, const SONARS: usize> Surroundi
         }
     }
 
-    /// What a ranger hears of the sound that it sent last.
+    /// The echo of the last pulse of a ranger.
     pub(super) fn heard(&self, sensor: usize) -> Echo {
         self.heard[sensor]
     }
 
-    /// Whether the world has a ranger dead, or has no more frames: then all of them are.
+    /// Whether a ranger is dead in the world's frame; all are dead after the last frame.
     pub(super) fn is_dead(&self, sensor: usize) -> bool {
         self.is_over() || self.frame.is_some_and(|frame| frame.echoes[sensor] == Echo::Dead)
     }
@@ -69,7 +69,7 @@ impl<WORLD: FnMut() -> Option<RingFrame<SONARS>>, const SONARS: usize> Surroundi
     }
 }
 
-/// What is heard of two sounds: the first that comes back. A dead ranger hears nothing, and sends nothing.
+/// The nearer of two echoes. A dead ranger receives nothing and sends nothing.
 fn nearer(own: Echo, other: Echo) -> Echo {
     match (own, other.range_mm()) {
         (Echo::Range { range_mm }, Some(other_mm)) => Echo::Range { range_mm: range_mm.min(other_mm) },
@@ -78,7 +78,7 @@ fn nearer(own: Echo, other: Echo) -> Echo {
     }
 }
 
-/// The time of flight there and back at 343 m/s, in microseconds, to the nearest.
+/// Round-trip time of flight at 343 m/s, in microseconds, rounded to the nearest.
 pub(super) fn flight_us(range_mm: u16) -> u32 {
     (u32::from(range_mm) * 2000 + 343 / 2) / 343
 }

@@ -1,5 +1,5 @@
-//! Faults between the firmware and its sensors: on the line to the bridge byte by byte, and on the bus behind it transfer by
-//! transfer.
+//! Faults between the firmware and its sensors: of each byte on the line to the bridge, and of each transfer on the bus
+//! behind it.
 
 use std::fmt;
 
@@ -9,20 +9,20 @@ use crate::chip::{BusAnswer, I2cDevices, Sc18im700};
 /// The 7-bit addresses of a bus.
 const ADDRESSES: usize = 128;
 
-/// What was done on the way to the sensors.
+/// Counts of the injected faults.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct BridgeCounts {
-    /// Bytes that were lost.
+    /// Lost bytes.
     pub dropped_bytes: u64,
-    /// Bytes of which a bit was flipped.
+    /// Bytes with a flipped bit.
     pub flipped_bits: u64,
     /// Transfers that were not acknowledged.
     pub refused_transfers: u64,
-    /// Answers that were late.
+    /// Late answers.
     pub late_answers: u64,
-    /// How often the bus got stuck.
+    /// Number of times that the bus got stuck.
     pub stuck_times: u64,
-    /// The transfers that this cost.
+    /// Transfers that failed on the stuck bus.
     pub stuck_transfers: u64,
 }
 
@@ -67,17 +67,17 @@ impl<DEVICES: I2cDevices> FaultyBridge<DEVICES> {
         Self { chip: Sc18im700::new(devices), rates, chance, dropped_bytes: 0, flipped_bits: 0 }
     }
 
-    /// Lets faults happen, or not.
+    /// Enables or disables the faults.
     pub fn set_faulty(&mut self, is_faulty: bool) {
         self.chip.devices.is_faulty = is_faulty;
     }
 
-    /// What is behind the bridge.
+    /// The devices behind the bridge.
     pub const fn devices(&self) -> &DEVICES {
         &self.chip.devices.devices
     }
 
-    /// Takes one byte from the UART and gives what the chip answers to it, or what arrives of that.
+    /// Takes one byte from the UART and returns the part of the chip's answer that arrives.
     pub fn byte(&mut self, byte: u8) -> Vec<u8> {
         if !self.chip.devices.is_faulty {
             return self.chip.byte(byte);
@@ -91,28 +91,28 @@ impl<DEVICES: I2cDevices> FaultyBridge<DEVICES> {
         self.chance.hurt(byte, dropped, flipped, (&mut self.dropped_bytes, &mut self.flipped_bits))
     }
 
-    /// What was done so far.
+    /// Counts of the faults so far.
     pub const fn counts(&self) -> BridgeCounts {
         let Self { dropped_bytes, flipped_bits, .. } = *self;
         BridgeCounts { dropped_bytes, flipped_bits, ..self.chip.devices.counts }
     }
 }
 
-/// Devices on a bus that fails now and then.
+/// Devices on a bus with random faults.
 #[derive(Debug)]
 struct FaultyDevices<DEVICES> {
     devices: DEVICES,
     rates: FaultRates,
     chance: Chance,
     is_faulty: bool,
-    /// For how many more questions the device at each address seems to be ranging.
+    /// Number of polls for which the device at each address still reads as ranging.
     polls_left: [u32; ADDRESSES],
     stuck_left: u32,
     counts: BridgeCounts,
 }
 
 impl<DEVICES> FaultyDevices<DEVICES> {
-    /// The answer that a fault puts in the place of the device's, if there is one.
+    /// The answer of a fault, in place of the answer of the device, if a fault occurs.
     fn fault<DATA>(&mut self) -> Option<BusAnswer<DATA>> {
         if !self.is_faulty {
             return None;
@@ -132,7 +132,7 @@ impl<DEVICES> FaultyDevices<DEVICES> {
         })
     }
 
-    /// Whether the device seems to be ranging still.
+    /// Whether the device still reads as ranging.
     fn is_late(&mut self, address: u8) -> bool {
         let Some(polls_left) = self.polls_left.get_mut(usize::from(address)).filter(|_| self.is_faulty) else {
             return false;
@@ -151,7 +151,8 @@ impl<DEVICES> FaultyDevices<DEVICES> {
 }
 
 impl<DEVICES: I2cDevices> I2cDevices for FaultyDevices<DEVICES> {
-    /// The device gets the write even when its acknowledgement is lost: the sound starts, and with it the world's next frame.
+    /// The device receives the write even when its acknowledgement is lost: the ranging starts, and with it the next
+    /// frame of the world.
     fn write(&mut self, address: u8, bytes: &[u8]) -> BusAnswer<()> {
         let answer = self.devices.write(address, bytes);
         self.fault().unwrap_or(answer)
@@ -185,13 +186,13 @@ mod tests {
         }
     }
 
-    /// Reads a byte of a device and the status of the bus, so often.
+    /// Reads a byte of a device and the status of the bus, `times` times.
     fn answers(bridge: &mut FaultyBridge<Seven>, times: usize) -> Vec<Vec<u8>> {
         (0..times).map(|_| b"S\xE1\x01PR\x0AP".iter().flat_map(|&byte| bridge.byte(byte)).collect()).collect()
     }
 
     #[test]
-    fn before_its_faults_begin_and_without_rates_a_bridge_is_sound() {
+    fn a_bridge_is_transparent_before_faults_are_enabled_and_at_zero_rates() {
         let mut bridge = FaultyBridge::new(Seven, FaultRates::scaled(1.0), 1);
         assert!(answers(&mut bridge, 100).iter().all(|answer| answer == &[7, 0xF0]));
         let mut bridge = FaultyBridge::new(Seven, FaultRates::NONE, 1);
@@ -201,7 +202,7 @@ mod tests {
     }
 
     #[test]
-    fn transfers_that_fail_show_in_the_status_and_are_counted() {
+    fn failed_transfers_set_the_status_and_are_counted() {
         let rates = FaultRates { transfer_refused: 0.1, transfers_stuck: 0.01, ..FaultRates::NONE };
         let mut bridge = FaultyBridge::new(Seven, rates, 1);
         bridge.set_faulty(true);
@@ -213,7 +214,7 @@ mod tests {
     }
 
     #[test]
-    fn a_late_device_answers_as_one_that_is_ranging_and_then_as_it_would() {
+    fn a_late_device_reads_as_ranging_and_then_answers() {
         let mut bridge = FaultyBridge::new(Seven, FaultRates { answer_late: 0.1, ..FaultRates::NONE }, 1);
         bridge.set_faulty(true);
         let answers = answers(&mut bridge, 1000);
@@ -222,7 +223,7 @@ mod tests {
     }
 
     #[test]
-    fn bytes_that_are_hurt_on_the_way_are_counted() {
+    fn lost_and_corrupted_bytes_are_counted() {
         let rates = FaultRates { bridge_byte_dropped: 0.01, bridge_bit_flipped: 0.01, ..FaultRates::NONE };
         let mut bridge = FaultyBridge::new(Seven, rates, 1);
         bridge.set_faulty(true);

@@ -1,4 +1,4 @@
-//! Faults of a serial line: bytes lost and changed, noise, and more requests than a robot takes.
+//! Faults of a serial line: lost and corrupted bytes, noise, and floods of requests.
 
 use std::fmt;
 
@@ -6,20 +6,20 @@ use toposlam::wire::{Command, Encoder, Inbox, MAX_FRAME_BYTES, Request};
 
 use super::{Chance, FaultRates};
 
-/// Requests of a flood have numbers from this on.
+/// Requests of a flood are numbered from this value on.
 const FIRST_FLOOD_ID: u16 = 0x8000;
 
 const _: () = assert!(
     LineInjector::BURST_BYTES > Inbox::BYTES_PER_TURN as u32,
-    "a burst can be more than a robot looks at in a turn"
+    "a burst can exceed the bytes that a robot reads in a turn"
 );
 
-/// What an injector did to a line.
+/// Counts of the injected faults.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct LineCounts {
-    /// Bytes that were lost.
+    /// Lost bytes.
     pub dropped_bytes: u64,
-    /// Bytes of which a bit was flipped.
+    /// Bytes with a flipped bit.
     pub flipped_bits: u64,
     /// Bursts of noise.
     pub bursts: u64,
@@ -39,7 +39,7 @@ impl fmt::Display for LineCounts {
     }
 }
 
-/// Changes what goes over a line in one direction.
+/// Injects faults into one direction of a serial line.
 #[derive(Clone, Debug)]
 pub struct LineInjector {
     rates: FaultRates,
@@ -50,18 +50,18 @@ pub struct LineInjector {
 }
 
 impl LineInjector {
-    /// The longest burst of noise, in bytes.
+    /// Length of the longest burst of noise, in bytes.
     pub const BURST_BYTES: u32 = 300;
-    /// The most requests that a flood brings at once.
+    /// Largest number of requests in a flood.
     pub const FLOOD_REQUESTS: u32 = 40;
 
-    /// One for a line.
+    /// An injector for one line.
     pub fn new(rates: FaultRates, seed: u64) -> Self {
         let counts = LineCounts::default();
         Self { rates, chance: Chance::new(seed, 1), encoder: Encoder::new(0), next_id: FIRST_FLOOD_ID, counts }
     }
 
-    /// What arrives of bytes that were sent.
+    /// Returns what arrives of the sent bytes.
     pub fn carry(&mut self, sent: &[u8]) -> Vec<u8> {
         let Self { rates, chance, counts, .. } = self;
         let LineCounts { dropped_bytes, flipped_bits, .. } = counts;
@@ -71,7 +71,7 @@ impl LineInjector {
         sent.iter().filter_map(arrives).collect()
     }
 
-    /// What else arrives in the time of a ring frame, mostly nothing: noise, and requests that nobody waits for.
+    /// Returns the other bytes that arrive during a ring frame, mostly none: noise and unsolicited requests.
     pub fn noise(&mut self) -> Vec<u8> {
         let mut noise = Vec::new();
         if self.chance.happens(self.rates.burst) {
@@ -94,7 +94,7 @@ impl LineInjector {
         noise
     }
 
-    /// What was done so far.
+    /// Counts of the faults so far.
     pub const fn counts(&self) -> LineCounts {
         self.counts
     }
@@ -107,7 +107,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn without_rates_a_line_carries_what_was_sent_and_nothing_else() {
+    fn a_line_is_transparent_at_zero_rates() {
         let mut line = LineInjector::new(FaultRates::NONE, 1);
         let sent: Vec<u8> = (0..=255).collect();
         assert_eq!(line.carry(&sent), sent);
@@ -116,7 +116,7 @@ mod tests {
     }
 
     #[test]
-    fn every_byte_that_is_hurt_is_counted() {
+    fn every_lost_or_corrupted_byte_is_counted() {
         let rates = FaultRates { byte_dropped: 0.1, bit_flipped: 0.1, ..FaultRates::NONE };
         let mut line = LineInjector::new(rates, 1);
         let arrived = line.carry(&[0; 10_000]);
@@ -127,7 +127,7 @@ mod tests {
     }
 
     #[test]
-    fn a_flood_is_made_of_requests_that_a_robot_understands() {
+    fn a_flood_consists_of_valid_requests() {
         let mut line = LineInjector::new(FaultRates { flood: 1.0, ..FaultRates::NONE }, 1);
         let bytes = line.noise();
         let mut decoder = Decoder::<Request>::new();

@@ -1,8 +1,8 @@
-//! Faults between a robot and its world, at stated rates: on its ring of sonars, on its serial line, and on the bus behind the
+//! Fault injection between a robot and its world: on its ring of sonars, on its serial line, and on the bus behind the
 //! bridge. The same rates and seed give the same faults.
 //!
-//! [`RingInjector`] changes ring frames and [`LineInjector`] bytes, for a robot on this computer; [`FaultyBridge`] stands between
-//! the firmware in the emulator and its sensors. `docs/faults.md` says what each fault does.
+//! [`RingInjector`] changes ring frames and [`LineInjector`] changes bytes, for a robot on the host. [`FaultyBridge`]
+//! connects the firmware in the emulator to its sensors. `docs/faults.md` describes the effect of each fault.
 //!
 //! ```
 //! use toposlam::FaultCounters;
@@ -28,14 +28,14 @@ pub use ring::{RingCounts, RingInjector};
 use rand::{RngExt, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
 
-/// How often each fault happens: probabilities, 0 to 1, each for the event that it names.
+/// Probability of each fault, 0 to 1, for each event that the field names.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FaultRates {
     /// A sonar's answer is lost; for each sonar and frame.
     pub answer_lost: f64,
-    /// A sonar answers any range from 0 to 6000 mm; for each sonar and frame.
+    /// A sonar returns any range from 0 to 6000 mm; for each sonar and frame.
     pub range_corrupted: f64,
-    /// The frame before comes again in the place of the frame; for each frame.
+    /// The previous frame repeats in place of the current one; for each frame.
     pub frame_delayed: f64,
     /// The bus of the sonars gets stuck, for 1 to [`FaultRates::STUCK_FRAMES`] frames; for each frame.
     pub bus_stuck: f64,
@@ -53,18 +53,18 @@ pub struct FaultRates {
     pub bridge_bit_flipped: f64,
     /// A sensor does not acknowledge; for each transfer on the bus.
     pub transfer_refused: f64,
-    /// A sensor is still ranging for 1 to [`FaultRates::LATE_POLLS`] questions more; for each transfer on the bus.
+    /// A sensor is still ranging for 1 to [`FaultRates::LATE_POLLS`] more polls; for each transfer on the bus.
     pub answer_late: f64,
     /// The bus is stuck for 1 to [`FaultRates::STUCK_TRANSFERS`] transfers; for each transfer.
     pub transfers_stuck: f64,
 }
 
 impl FaultRates {
-    /// The most frames for which the bus of the sonars is stuck.
+    /// Largest number of frames for which the bus of the sonars is stuck.
     pub const STUCK_FRAMES: u32 = 20;
-    /// The most questions for which a late sensor is late; the driver asks some fifty times.
+    /// Largest number of polls for which a late sensor is late; the driver polls some fifty times.
     pub const LATE_POLLS: u32 = 8;
-    /// The most transfers for which the bus behind the bridge is stuck: three frames' worth.
+    /// Largest number of transfers for which the bus behind the bridge is stuck: those of three frames.
     pub const STUCK_TRANSFERS: u32 = 100;
 
     /// No faults.
@@ -84,9 +84,9 @@ impl FaultRates {
         transfers_stuck: 0.0,
     };
 
-    /// All faults by one number, 0 to 1. It is the probability of the faults that touch one answer or one frame; those that
-    /// last are a tenth to a hundredth as frequent, and a byte to or from the bridge, of which a frame has some 300, is hurt a
-    /// thousandth as often.
+    /// Scales all faults by one number, 0 to 1. It is the probability of the faults that affect one answer or one
+    /// frame. Lasting faults are a tenth to a hundredth as frequent. A byte to or from the bridge is affected a
+    /// thousandth as often, because a frame takes some 300 of them.
     pub const fn scaled(rate: f64) -> Self {
         Self {
             answer_lost: rate,
@@ -106,12 +106,12 @@ impl FaultRates {
     }
 }
 
-/// The draws of one injector.
+/// The random numbers of one injector.
 #[derive(Clone, Debug)]
 struct Chance(Xoshiro256PlusPlus);
 
 impl Chance {
-    /// `which` keeps injectors with the same seed apart.
+    /// `which` separates injectors with the same seed.
     fn new(seed: u64, which: u64) -> Self {
         Self(Xoshiro256PlusPlus::seed_from_u64(seed.wrapping_mul(8).wrapping_add(which)))
     }
@@ -120,12 +120,12 @@ impl Chance {
         probability > 0.0 && self.0.random_bool(probability.min(1.0))
     }
 
-    /// A number of a range, its end included.
+    /// A number in a range, the end included.
     fn within(&mut self, from: u32, to: u32) -> u32 {
         self.0.random_range(from..=to)
     }
 
-    /// Drops a byte, flips one of its bits, or leaves it; and counts that.
+    /// Drops a byte, flips one of its bits or leaves it, and counts the fault.
     fn hurt(&mut self, byte: u8, dropped: f64, flipped: f64, counts: (&mut u64, &mut u64)) -> Option<u8> {
         if self.happens(dropped) {
             *counts.0 += 1;

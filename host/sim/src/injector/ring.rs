@@ -1,4 +1,4 @@
-//! Faults of the ring of sonars, as its driver hands them on.
+//! Faults of the ring of sonars, as its driver reports them.
 
 use std::fmt;
 
@@ -8,21 +8,21 @@ use toposlam::{FaultCounters, FaultKind};
 
 use super::{Chance, FaultRates};
 
-/// A corrupted range is any up to this one, in millimetres.
+/// Largest corrupted range, in millimetres.
 const RANGE_MAX_MM: u32 = 6000;
 
-/// What an injector did to ring frames.
+/// Counts of the injected faults.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct RingCounts {
-    /// Answers that were lost.
+    /// Lost answers.
     pub lost_answers: u64,
-    /// Ranges that were replaced by another one.
+    /// Replaced ranges.
     pub corrupted_ranges: u64,
-    /// Frames that came again in the place of another.
+    /// Frames that were replaced by the previous one.
     pub delayed_frames: u64,
-    /// How often the bus got stuck.
+    /// Number of times that the bus got stuck.
     pub stuck_times: u64,
-    /// The frames without any sonar that this cost.
+    /// Frames without any sonar on the stuck bus.
     pub stuck_frames: u64,
 }
 
@@ -36,25 +36,25 @@ impl fmt::Display for RingCounts {
     }
 }
 
-/// Changes the frames between a world and a robot.
+/// Injects faults into the frames between a world and a robot.
 #[derive(Clone, Debug)]
 pub struct RingInjector {
     rates: FaultRates,
     chance: Chance,
-    /// The last frame that the sonars heard and the robot got.
+    /// The last frame that the sonars measured and the robot received.
     before: Option<RingFrame<SONARS>>,
     stuck_frames_left: u32,
     counts: RingCounts,
 }
 
 impl RingInjector {
-    /// One for a world.
+    /// An injector for one world.
     pub fn new(rates: FaultRates, seed: u64) -> Self {
         Self { rates, chance: Chance::new(seed, 0), before: None, stuck_frames_left: 0, counts: RingCounts::default() }
     }
 
-    /// What the robot gets of a frame. `driver` are the faults that the ring's driver counts: a lost answer as `SonarSilent`, each
-    /// sonar on a stuck bus as `BusError`.
+    /// Returns the frame that the robot receives. `driver` counts the faults that the ring's driver counts: a lost
+    /// answer as `SonarSilent`, each sonar on a stuck bus as `BusError`.
     pub fn disturb(&mut self, frame: RingFrame<SONARS>, driver: &mut FaultCounters) -> RingFrame<SONARS> {
         if self.stuck_frames_left == 0 && self.chance.happens(self.rates.bus_stuck) {
             self.stuck_frames_left = self.chance.within(1, FaultRates::STUCK_FRAMES);
@@ -87,7 +87,7 @@ impl RingInjector {
         frame
     }
 
-    /// What was done so far.
+    /// Counts of the faults so far.
     pub const fn counts(&self) -> RingCounts {
         self.counts
     }
@@ -106,14 +106,14 @@ mod tests {
     }
 
     #[test]
-    fn the_same_seed_gives_the_same_faults_and_another_seed_others() {
+    fn faults_are_reproducible_from_the_seed() {
         let rates = FaultRates::scaled(0.1);
         assert_eq!(frames(rates, 1).0, frames(rates, 1).0);
         assert_ne!(frames(rates, 1).0, frames(rates, 2).0);
     }
 
     #[test]
-    fn what_is_counted_is_what_the_frames_show() {
+    fn the_counts_match_the_faults_in_the_frames() {
         let (got, counts, driver) = frames(FaultRates::scaled(0.05), 3);
         let blind = got.iter().filter(|frame| frame.dead_sensors().count() == SONARS).count() as u64;
         let dead: usize = got.iter().map(|frame| frame.dead_sensors().count()).sum();

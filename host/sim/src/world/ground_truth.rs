@@ -1,4 +1,4 @@
-//! Compares the places that were detected with the true nodes that were visited.
+//! Compares the detected places with the visited true nodes.
 
 use std::fmt;
 
@@ -6,9 +6,9 @@ use toposlam::place::Place;
 
 use super::{TrueMap, Truth};
 
-/// A place detected farther from every true node is a phantom, in millimetres.
+/// A place farther than this from every true node is a phantom, in millimetres.
 const MATCH_MM: f64 = 500.0;
-/// A detected place belongs to a visit when it is at most this many frames off.
+/// Largest offset between a visit and a place that belongs to it, in frames.
 const MATCH_FRAMES: u32 = 30;
 
 /// One visit to a true node.
@@ -20,7 +20,7 @@ struct Visit {
 }
 
 impl Visit {
-    /// How many frames lie between the visit and a frame.
+    /// Number of frames between the visit and a frame.
     fn frames_off(&self, frame_index: u32) -> u32 {
         self.first_frame.saturating_sub(frame_index).max(frame_index.saturating_sub(self.last_frame))
     }
@@ -29,15 +29,15 @@ impl Visit {
 /// A detected place and the true node it was detected at, if any.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Detection {
-    /// What the detector said.
+    /// The place that the detector reported.
     pub place: Place,
-    /// Where the robot was in the place's frame.
+    /// Position of the robot in the frame of the place.
     pub position: super::Point,
     /// The true node nearby; `None` for a phantom.
     pub node: Option<usize>,
 }
 
-/// A log of a drive: what was visited and what was detected. Memory grows by some 40 bytes a frame.
+/// A log of a drive: the visited nodes and the detected places. Memory grows by some 40 bytes per frame.
 pub struct GroundTruth {
     map: TrueMap,
     truths: Vec<Truth>,
@@ -45,24 +45,24 @@ pub struct GroundTruth {
     detections: Vec<Detection>,
 }
 
-/// How the detected places compare with the visits.
+/// Comparison of the detected places with the visits.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Report {
     /// Completed visits to true nodes.
     pub visits: usize,
-    /// Visits that gave at least one place.
+    /// Visits with at least one detected place.
     pub found: usize,
-    /// Visits that gave none.
+    /// Visits without a detected place.
     pub missed: usize,
-    /// Places beyond the first of a visit.
+    /// Places after the first one of the same visit.
     pub doubled: usize,
     /// Places away from every true node.
     pub phantom: usize,
-    /// Detected radius less true radius of every place found, in millimetres, in ascending order.
+    /// Detected minus true radius of every found place, in millimetres, in ascending order.
     pub radius_errors_mm: Vec<f64>,
-    /// Found places whose degree was told, and those among them where it was right.
+    /// Number of found places with a reported degree, and number of those whose degree is right.
     pub degrees: (usize, usize),
-    /// Each true node's visits and misses.
+    /// Visits and misses of each true node.
     pub nodes: Vec<(usize, usize)>,
 }
 
@@ -72,7 +72,7 @@ impl GroundTruth {
         Self { map: map.clone(), truths: Vec::new(), visits: Vec::new(), detections: Vec::new() }
     }
 
-    /// Notes where the robot is; once for every frame, before the frame's place if there is one.
+    /// Logs the pose of the robot. Call it once for every frame, before logging a place of that frame.
     pub fn drive(&mut self, truth: &Truth) {
         self.truths.push(*truth);
         let Some(node) = truth.node else { return };
@@ -86,7 +86,7 @@ impl GroundTruth {
         }
     }
 
-    /// Notes a detected place and says at which true node it was.
+    /// Logs a detected place and assigns it to a true node.
     pub fn detect(&mut self, place: &Place) -> Detection {
         let truth = self.truths.get(place.frame_index as usize).or(self.truths.last());
         let position = truth.map(|truth| truth.pose.position).unwrap_or_default();
@@ -96,7 +96,7 @@ impl GroundTruth {
         detection
     }
 
-    /// How many visits to true nodes began so far.
+    /// Number of visits to true nodes that have begun so far.
     pub fn visits(&self) -> usize {
         self.visits.len()
     }
@@ -106,7 +106,7 @@ impl GroundTruth {
         &self.detections
     }
 
-    /// The comparison. The last visit is left out, since its place may not be reported yet.
+    /// Compares the places with the visits. The last visit is left out, because its place may not be reported yet.
     pub fn report(&self) -> Report {
         let completed = self.visits.len().saturating_sub(1);
         let mut places_of = vec![0usize; self.visits.len()];
@@ -150,12 +150,12 @@ impl GroundTruth {
 }
 
 impl Report {
-    /// The radius error that half of the places do not exceed in absolute value, in millimetres.
+    /// Median of the absolute radius error, in millimetres.
     pub fn radius_error_median_mm(&self) -> f64 {
         self.radius_error_mm(0.5)
     }
 
-    /// The radius error that nine tenths of the places do not exceed in absolute value, in millimetres.
+    /// 90th percentile of the absolute radius error, in millimetres.
     pub fn radius_error_p90_mm(&self) -> f64 {
         self.radius_error_mm(0.9)
     }

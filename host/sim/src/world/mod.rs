@@ -1,11 +1,11 @@
-//! A simulated building and a robot in it that drives the building's Voronoi graph and reads a ring of sonars.
+//! A simulated building, and a robot with a ring of sonars that drives along the building's Voronoi graph.
 //!
 //! ```
 //! use toposlam::place::{PlaceConfig, PlaceDetector};
 //! use toposlam::ring::RingGeometry;
 //! use toposlam_sim::world::{GroundTruth, Plan, RobotModel, SONARS, Simulation};
 //!
-//! let plan = Plan::built_in("ring").expect("it is built in");
+//! let plan = Plan::built_in("ring").expect("a built-in plan");
 //! let mut simulation = Simulation::new(&plan, RobotModel::default(), 7)?;
 //! let mut ground_truth = GroundTruth::new(simulation.true_map());
 //! let mut detector = PlaceDetector::<SONARS>::new();
@@ -59,7 +59,7 @@ impl Point {
         (other.y_mm - self.y_mm).atan2(other.x_mm - self.x_mm)
     }
 
-    /// The point at this share of the way to another.
+    /// The point at this fraction of the line to another point.
     fn towards(self, other: Self, share: f64) -> Self {
         Self::new(self.x_mm + (other.x_mm - self.x_mm) * share, self.y_mm + (other.y_mm - self.y_mm) * share)
     }

@@ -27,7 +27,7 @@ pub(super) struct Face {
 }
 
 impl Face {
-    /// The distance of a point to the face.
+    /// Distance of a point from the face.
     pub(super) fn distance_mm(&self, point: Point) -> f64 {
         let x = point.x_mm.clamp(f64::from(self.from.0), f64::from(self.to.0));
         let y = point.y_mm.clamp(f64::from(self.from.1), f64::from(self.to.1));
@@ -43,7 +43,7 @@ pub enum PlanError {
     Header,
     /// A character other than `#`, `.` and `S`.
     Character {
-        /// What stands there.
+        /// The character.
         character: char,
         /// The line, counted from 1.
         line: usize,
@@ -80,10 +80,10 @@ impl Plan {
         Self::parse(text).ok()
     }
 
-    /// Reads a plan.
+    /// Parses a plan.
     ///
     /// # Errors
-    /// What is wrong with the text, and where.
+    /// [`PlanError`] when the text is not a plan.
     pub fn parse(text: &str) -> Result<Self, PlanError> {
         let mut lines = text.lines();
         let header = lines.next().and_then(|line| line.strip_prefix("cell_mm "));
@@ -128,17 +128,17 @@ impl Plan {
         self.rows() as f64 * f64::from(self.cell_mm)
     }
 
-    /// How many cells stand in a row.
+    /// Number of cells in a row.
     pub const fn columns(&self) -> usize {
         self.columns
     }
 
-    /// How many rows there are.
+    /// Number of rows.
     pub fn rows(&self) -> usize {
         self.walls.len() / self.columns.max(1)
     }
 
-    /// Where the robot starts.
+    /// The start position of the robot.
     pub const fn start(&self) -> Point {
         self.start
     }
@@ -155,7 +155,7 @@ impl Plan {
         self.is_wall((point.x_mm / cell_mm).floor() as i32, (point.y_mm / cell_mm).floor() as i32)
     }
 
-    /// The surfaces of the walls, each as long as it is straight.
+    /// The surfaces of the walls, one face for each maximal straight piece.
     pub(super) fn faces(&self) -> Vec<Face> {
         let (columns, rows) = (self.columns as i32, self.rows() as i32);
         let along_x = runs(rows, columns, |row, column| (self.is_wall(column, row - 1), self.is_wall(column, row)));
@@ -215,7 +215,7 @@ mod tests {
     }
 
     #[test]
-    fn a_plan_with_a_fault_says_where() {
+    fn an_invalid_plan_is_rejected_with_its_error() {
         assert_eq!(Plan::parse("#S#").unwrap_err(), PlanError::Header);
         assert_eq!(Plan::parse("cell_mm 20\n#S#").unwrap_err(), PlanError::Header);
         assert_eq!(Plan::parse("cell_mm 250\n#.#").unwrap_err(), PlanError::Start);
@@ -225,14 +225,14 @@ mod tests {
     }
 
     #[test]
-    fn the_outside_is_wall() {
+    fn cells_outside_the_plan_are_wall() {
         let plan = Plan::parse("cell_mm 500\nS").unwrap();
         assert!(plan.is_wall(-1, 0) && plan.is_wall(0, 1) && plan.is_wall(1, 0) && !plan.is_wall(0, 0));
         assert_eq!(plan.faces().len(), 4);
     }
 
     #[test]
-    fn every_built_in_plan_is_readable() {
+    fn every_built_in_plan_parses() {
         for (name, _) in Plan::BUILT_IN {
             assert!(Plan::built_in(name).is_some(), "{name}");
         }

@@ -1,4 +1,4 @@
-//! What a ring of sonars hears in a floor plan.
+//! Simulates the readings of a ring of sonars in a floor plan by ray casting.
 
 use std::f64::consts::{PI, TAU};
 
@@ -9,31 +9,31 @@ use toposlam::ring::{Echo, RingFrame};
 use super::plan::Plan;
 use super::{Point, Pose};
 
-/// How many sonars the simulated ring has: evenly spaced and counter-clockwise, the first straight ahead.
+/// Number of sonars of the simulated ring: evenly spaced and counter-clockwise, the first straight ahead.
 pub const SONARS: usize = 16;
-/// Rays cast for each sonar's share of the turn; the cones overlap and share their rays.
+/// Number of rays between the axes of two neighbouring sonars. Overlapping cones share their rays.
 const RAYS_EACH: usize = 6;
 const RAYS: usize = SONARS * RAYS_EACH;
 
-/// How good the sonars are.
+/// Cone, range and noise of the sonars.
 ///
-/// A sonar hears the nearest thing in its cone that sends sound back: a wall that is hit not too far off its normal,
-/// or a corner, convex (its edge scatters) or concave (it reflects straight back).
+/// A sonar measures the nearest reflector in its cone: a wall that is hit close to its normal, or a corner, convex (its
+/// edge scatters) or concave (it reflects straight back).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SonarModel {
     /// Half the opening angle of a cone, in radians. Default 0.262 (15°).
     pub cone_half_angle_rad: f64,
-    /// Nothing nearer is heard, in millimetres. Default 30 (SRF08).
+    /// Smallest range that a sonar measures, in millimetres. Default 30 (SRF08).
     pub range_min_mm: f64,
-    /// Nothing farther is heard, in millimetres. Default 6000 (SRF08).
+    /// Largest range that a sonar measures, in millimetres. Default 6000 (SRF08).
     pub range_max_mm: f64,
     /// Standard deviation of a range, in millimetres. Default 15.
     pub range_sd_mm: f64,
-    /// Share of the echoes that are missed, 0 to 1. Default 0.02.
+    /// Probability of a missed echo, 0 to 1. Default 0.02.
     pub missed_share: f64,
-    /// A wall hit farther off its normal reflects the sound away, in radians. Default 0.436 (25°).
+    /// Largest angle of incidence at which a wall returns an echo, in radians. Default 0.436 (25°).
     pub specular_limit_rad: f64,
-    /// Which sonars never answer, a bit for each. Default none.
+    /// Sonars that never answer, one bit for each. Default none.
     pub dead_sonars: u16,
 }
 
@@ -51,7 +51,7 @@ impl Default for SonarModel {
     }
 }
 
-/// An angle brought into −π to π.
+/// Wraps an angle to −π to π.
 pub(super) fn wrapped(angle_rad: f64) -> f64 {
     (angle_rad + PI).rem_euclid(TAU) - PI
 }
@@ -67,13 +67,13 @@ impl Scene {
         Self { plan: plan.clone(), corners: plan.corners() }
     }
 
-    /// One reading of the ring.
+    /// Simulates one reading of the ring.
     pub(super) fn frame(&self, pose: &Pose, model: &SonarModel, random: &mut impl Rng) -> RingFrame<SONARS> {
         let mut heard_mm = self.walls(pose, model);
         self.hear_corners(pose, model, &mut heard_mm);
         let mut echoes = [Echo::Dead; SONARS];
         for (sonar, (echo, heard_mm)) in echoes.iter_mut().zip(heard_mm).enumerate() {
-            // Drawn for every sonar, so that a dead one does not change what the others hear.
+            // Drawn for every sonar, so that a dead one does not change the readings of the others.
             let noise_mm: f64 = StandardNormal.sample(random);
             let missed = random.random_bool(model.missed_share);
             let range_mm = (heard_mm + noise_mm * model.range_sd_mm).max(model.range_min_mm);
@@ -88,7 +88,7 @@ impl Scene {
         RingFrame { echoes }
     }
 
-    /// The nearest wall that each sonar hears, in millimetres; infinite when there is none.
+    /// Range of the nearest wall that each sonar measures, in millimetres; infinite without an echo.
     fn walls(&self, pose: &Pose, model: &SonarModel) -> [f64; SONARS] {
         let spacing = TAU / RAYS as f64;
         let rays: [f64; RAYS] = std::array::from_fn(|ray| {
@@ -103,7 +103,7 @@ impl Scene {
         })
     }
 
-    /// Lets each sonar hear the corners in its cone that are in sight.
+    /// Adds the echoes of the visible corners in each cone.
     fn hear_corners(&self, pose: &Pose, model: &SonarModel, heard_mm: &mut [f64; SONARS]) {
         for corner in &self.corners {
             let range_mm = pose.position.distance_mm(*corner);
@@ -125,13 +125,13 @@ impl Scene {
         }
     }
 
-    /// Where a ray meets the first wall: the distance in millimetres (infinite beyond the limit), and how far off the
-    /// wall's normal it hits.
+    /// Casts a ray to the first wall: the distance in millimetres (infinite beyond the limit), and the angle of
+    /// incidence.
     fn cast(&self, from: Point, direction: f64, limit_mm: f64) -> (f64, f64) {
         let cell_mm = f64::from(self.plan.cell_mm());
         let (sine, cosine) = direction.sin_cos();
         let (mut column, mut row) = ((from.x_mm / cell_mm).floor() as i32, (from.y_mm / cell_mm).floor() as i32);
-        // For each axis: the step in cells, the way between two grid lines, the way to the first one.
+        // For each axis: the step in cells, the distance between two grid lines, the distance to the first one.
         let axis = |cell: i32, start_mm: f64, slope: f64| {
             let line = if slope > 0.0 { cell + 1 } else { cell };
             let to_line = (f64::from(line) * cell_mm - start_mm) / slope;
@@ -176,14 +176,14 @@ mod tests {
     }
 
     #[test]
-    fn a_ray_ends_at_the_wall_it_meets() {
+    fn a_ray_ends_at_the_first_wall() {
         let (range_mm, off_normal_rad) = closet().cast(Point::new(1000.0, 600.0), 0.3, 6000.0);
         assert!((range_mm - 3000.0 / 0.3f64.cos()).abs() < 1e-6);
         assert!((off_normal_rad - 0.3).abs() < 1e-9);
     }
 
     #[test]
-    fn the_walls_of_a_room_are_heard_ahead_and_beside_and_specular_loss_leaves_the_corners() {
+    fn perpendicular_walls_and_corners_return_echoes_and_oblique_walls_do_not() {
         let perfect = SonarModel { range_sd_mm: 0.0, missed_share: 0.0, ..SonarModel::default() };
         let pose = Pose { position: Point::new(3000.0, 1000.0), heading_rad: 0.0 };
         let mut random = Xoshiro256PlusPlus::seed_from_u64(1);

@@ -1,4 +1,4 @@
-//! A robot that drives where it is told: two wheels, a body that walls stop, and a ring of sonars.
+//! A differential-drive robot that follows velocity commands, with a body that walls stop and a ring of sonars.
 
 use rand::SeedableRng;
 use rand_distr::{Distribution, StandardNormal};
@@ -9,22 +9,22 @@ use toposlam::ring::RingFrame;
 use super::ray_casting::{SONARS, Scene, wrapped};
 use super::{Plan, Point, Pose, RobotModel, TrueMap, Truth, VoronoiError};
 
-/// The robot is at a true node within this distance, in millimetres.
+/// Distance within which the robot is at a true node, in millimetres.
 const AT_NODE_MM: f64 = 200.0;
-/// Steps of the motion between two frames.
+/// Integration steps of the motion between two frames.
 const STEPS: u32 = 4;
 
-/// The body of the robot and how well its wheels obey.
+/// The body of the robot and the errors of its wheels.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct BodyModel {
-    /// Half the robot's width, in millimetres. Default 150. No wall comes nearer to its centre.
+    /// Half the robot's width, in millimetres; no wall comes nearer to its centre. Default 150.
     pub radius_mm: f64,
     /// The distance between the wheels, in millimetres. Default 200.
     pub track_mm: f64,
-    /// How the robot turns a velocity into wheel speeds.
+    /// Conversion of a velocity command into wheel speeds.
     pub wheels: WheelsConfig,
-    /// Standard deviation by which each wheel is faster or slower than it should be, as a share. Default 0.05. It lasts as
-    /// long as the deviations of [`RobotModel`].
+    /// Standard deviation of the relative speed error of each wheel. Default 0.05. The error lasts as long as the
+    /// deviations of [`RobotModel`].
     pub slip_share: f64,
 }
 
@@ -34,8 +34,8 @@ impl Default for BodyModel {
     }
 }
 
-/// A robot in a floor plan. Read a frame, follow a velocity, and so on; the same plan, model, seed and velocities give the
-/// same frames.
+/// A robot in a floor plan: read a frame, follow a velocity command, and repeat. The same plan, model, seed and
+/// velocity commands give the same frames.
 pub struct Rover {
     scene: Scene,
     plan: Plan,
@@ -50,7 +50,7 @@ pub struct Rover {
 }
 
 impl Rover {
-    /// Puts the robot on the plan's start, looking anywhere.
+    /// Places the robot at the start of the plan, with a random heading.
     ///
     /// # Errors
     /// When the plan has no true map.
@@ -72,17 +72,17 @@ impl Rover {
         })
     }
 
-    /// The building's true places and connections.
+    /// The true map of the building.
     pub const fn true_map(&self) -> &TrueMap {
         &self.map
     }
 
-    /// In how many frames the robot was stopped by a wall.
+    /// Number of frames in which a wall stopped the robot.
     pub const fn bumps(&self) -> u32 {
         self.bumps
     }
 
-    /// Reads the ring once, and says what is true in that frame.
+    /// Reads the ring once and returns the ground truth of that frame.
     pub fn frame(&mut self) -> (RingFrame<SONARS>, Truth) {
         let frame = self.scene.frame(&self.pose, &self.model.sonar, &mut self.random);
         let node = self.map.nearest_node(self.pose.position).filter(|(_, distance_mm)| *distance_mm <= AT_NODE_MM);
@@ -92,12 +92,12 @@ impl Rover {
         (frame, truth)
     }
 
-    /// Where the robot is.
+    /// Position of the robot.
     pub const fn position(&self) -> Point {
         self.pose.position
     }
 
-    /// Drives on until the next frame.
+    /// Follows a velocity command until the next frame.
     pub fn follow(&mut self, velocity: VelocityCommand) {
         let WheelSpeeds { left_permille, right_permille } = WheelSpeeds::from_velocity(velocity, &self.body.wheels);
         let kept = (-1.0 / (self.model.frames_per_s * self.model.deviation_s)).exp();
@@ -125,12 +125,12 @@ impl Rover {
         self.bumps += u32::from(bumped);
     }
 
-    /// Lifts the robot up and puts it somewhere else, looking another way.
+    /// Moves the robot to another pose without driving, as in the kidnapped-robot problem.
     pub fn carry_to(&mut self, pose: Pose) {
         self.pose = pose;
     }
 
-    /// Whether the body has room there.
+    /// Whether the body fits at a position.
     fn fits(&self, position: Point) -> bool {
         (0..16).all(|direction| {
             let (sine, cosine) = (f64::from(direction) * std::f64::consts::TAU / 16.0).sin_cos();

@@ -1,4 +1,4 @@
-//! A robot that drives the true Voronoi graph at random and reads its sonars at every step.
+//! A robot that drives along the true Voronoi graph at random and reads its sonars at every step.
 
 use std::f64::consts::PI;
 
@@ -11,12 +11,12 @@ use toposlam::ring::RingFrame;
 use super::ray_casting::{SONARS, Scene, SonarModel, wrapped};
 use super::{Plan, Point, TrueEdge, TrueMap, VoronoiError};
 
-/// Where the robot is and where it looks.
+/// Position and heading of the robot.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Pose {
     /// The centre of the ring.
     pub position: Point,
-    /// Where the first sonar looks, counter-clockwise from the x axis, in radians.
+    /// Direction of the first sonar, counter-clockwise from the x axis, in radians.
     pub heading_rad: f64,
 }
 
@@ -27,21 +27,21 @@ impl Pose {
     }
 }
 
-/// What is true in one frame.
+/// Ground truth of one frame.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Truth {
     /// The frame, counted from 0.
     pub frame_index: u32,
-    /// Where the robot is.
+    /// Pose of the robot.
     pub pose: Pose,
-    /// The true node that the robot is at: in the frame in which it comes by, and while it turns there.
+    /// The true node that the robot is at: in the frame in which it passes the node, and while it turns there.
     pub node: Option<usize>,
-    /// What the drive knows of the way to the nearest node, without any odometry: whether the robot turned back or drove
-    /// on at the node before that one; `None` when it has not been at a node before.
+    /// How the robot left the node before the nearest one: it turned back or drove on. The drive knows this without
+    /// odometry. `None` when the robot has not visited a node before.
     pub turn: Option<Turn>,
 }
 
-/// How the robot drives and what its sonars are worth. Speeds, rates and times must be above 0.
+/// Motion and sonars of the robot. Speeds, rates and times must be above 0.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RobotModel {
     /// Speed, in millimetres a second. Default 300.
@@ -50,15 +50,15 @@ pub struct RobotModel {
     pub frames_per_s: f64,
     /// How fast the robot turns on the spot, in radians a second. Default π/2.
     pub turn_rad_per_s: f64,
-    /// How often the robot turns back at a node that leads on, 0 to 1. Default 0.1. At dead ends it always does.
+    /// Probability of a turn back at a node with other edges, 0 to 1. Default 0.1. At dead ends it is 1.
     pub u_turn_share: f64,
-    /// Standard deviation of the way driven from the Voronoi graph, sideways, in millimetres. Default 20.
+    /// Standard deviation of the lateral offset from the Voronoi graph, in millimetres. Default 20.
     pub track_sd_mm: f64,
-    /// Standard deviation of the heading from the way's direction, in radians. Default 0.03.
+    /// Standard deviation of the heading from the direction of the edge, in radians. Default 0.03.
     pub heading_sd_rad: f64,
-    /// How long the two deviations last, in seconds. Default 1.
+    /// Correlation time of the two deviations, in seconds. Default 1.
     pub deviation_s: f64,
-    /// Its sonars.
+    /// Model of the sonars.
     pub sonar: SonarModel,
 }
 
@@ -78,7 +78,7 @@ impl Default for RobotModel {
 }
 
 impl RobotModel {
-    /// The same robot with every noise multiplied: range noise, missed echoes, and deviation from the way.
+    /// The same robot with every noise scaled: range noise, missed echoes, and deviation from the edge.
     pub fn with_noise(self, factor: f64) -> Self {
         let sonar = SonarModel {
             range_sd_mm: self.sonar.range_sd_mm * factor,
@@ -89,11 +89,11 @@ impl RobotModel {
     }
 }
 
-/// A deviation of standard deviation 1 that fades slowly into the next one.
+/// A random deviation of standard deviation 1 that is correlated in time.
 struct Drift(f64);
 
 impl Drift {
-    /// The deviation a time step later, for a step of this share of the time that deviations last.
+    /// Advances by a time step, given as a fraction of the correlation time, and returns the new deviation.
     fn step(&mut self, share: f64, random: &mut Xoshiro256PlusPlus) -> f64 {
         let kept = (-share).exp();
         let fresh: f64 = StandardNormal.sample(random);
@@ -102,7 +102,7 @@ impl Drift {
     }
 }
 
-/// A drive without end: an iterator over the ring frames and what is true in each.
+/// An endless drive: an iterator over the ring frames and their ground truth.
 ///
 /// The same plan, model and seed give the same drive.
 pub struct Simulation {
@@ -111,15 +111,15 @@ pub struct Simulation {
     model: RobotModel,
     random: Xoshiro256PlusPlus,
     frame_index: u32,
-    /// The way being driven: which edge, whether from its second node to its first, and the node it leads to.
+    /// The current edge, whether it is driven from its second node to its first, and the node it leads to.
     way: Vec<Point>,
     edge: usize,
     reversed: bool,
     target: usize,
-    /// How far along the way the robot is: the leg, and the distance driven on it.
+    /// Position on the edge: the leg, and the distance driven on it.
     leg: usize,
     driven_mm: f64,
-    /// How the robot left the node behind it, and the one before that.
+    /// How the robot left the last node, and the one before that.
     turns: [Option<Turn>; 2],
     heading_rad: f64,
     at_node: Option<usize>,
@@ -128,7 +128,7 @@ pub struct Simulation {
 }
 
 impl Simulation {
-    /// Puts the robot on the point of the Voronoi graph that is nearest to the plan's start.
+    /// Places the robot on the point of the Voronoi graph that is nearest to the start of the plan.
     ///
     /// # Errors
     /// When the plan has no true map.
@@ -165,12 +165,12 @@ impl Simulation {
         })
     }
 
-    /// The building's true places and connections.
+    /// The true map of the building.
     pub const fn true_map(&self) -> &TrueMap {
         &self.map
     }
 
-    /// Where the robot is now: beside its way and a little askew.
+    /// The current pose of the robot, with its lateral and heading deviations.
     fn pose(&mut self) -> Pose {
         let ends = &self.way[self.leg..self.leg + 2];
         let on_way = ends[0].towards(ends[1], self.driven_mm / ends[0].distance_mm(ends[1]));
@@ -182,7 +182,7 @@ impl Simulation {
         Pose { position, heading_rad: wrapped(self.heading_rad + askew_rad) }
     }
 
-    /// Moves the robot on by the time between two frames.
+    /// Advances the robot by the time between two frames.
     fn step(&mut self) {
         self.at_node = None;
         let mut left_s = 1.0 / self.model.frames_per_s;
@@ -191,7 +191,7 @@ impl Simulation {
             let leg_mm = ends[0].distance_mm(ends[1]);
             let ahead_rad = ends[0].direction_to(ends[1]);
             let turn_rad = wrapped(ahead_rad - self.heading_rad);
-            // Only at a node the way has a kink that the robot stops for.
+            // The robot stops to turn only at a node.
             if self.leg == 0 && self.driven_mm == 0.0 && turn_rad.abs() > 1e-6 {
                 let can_rad = self.model.turn_rad_per_s * left_s;
                 self.at_node = Some(self.node_behind());
@@ -215,22 +215,22 @@ impl Simulation {
         }
     }
 
-    /// How the robot left the node before the nearer end of its way.
+    /// How the robot left the node before the nearer end of its edge.
     fn turn(&self) -> Option<Turn> {
         let length_mm = |way: &[Point]| way.windows(2).map(|ends| ends[0].distance_mm(ends[1])).sum::<f64>();
         let driven_mm = length_mm(&self.way[..=self.leg]) + self.driven_mm;
         self.turns[usize::from(2.0 * driven_mm < length_mm(&self.way))]
     }
 
-    /// The node the present way begins at.
+    /// The node at which the current edge begins.
     fn node_behind(&self) -> usize {
         self.map.edges[self.edge].nodes[usize::from(self.reversed)]
     }
 
-    /// Chooses the way on from the node that was reached.
+    /// Chooses the next edge at the node that was reached.
     fn choose(&mut self) {
         let here = self.target;
-        // Each edge from each of its ends that is here: a loop can be driven both ways.
+        // Each edge, once for each of its ends at this node: a loop can be driven both ways.
         let mut ways: Vec<(usize, bool)> = Vec::new();
         for (index, edge) in self.map.edges.iter().enumerate() {
             ways.extend(
@@ -252,12 +252,12 @@ impl Simulation {
     }
 }
 
-/// How far along a leg the point nearest to another lies, in millimetres.
+/// Distance along a leg of the point nearest to another point, in millimetres.
 fn along(ends: &[Point], point: Point) -> f64 {
     let length_mm = ends[0].distance_mm(ends[1]);
     let dot = (point.x_mm - ends[0].x_mm) * (ends[1].x_mm - ends[0].x_mm)
         + (point.y_mm - ends[0].y_mm) * (ends[1].y_mm - ends[0].y_mm);
-    // Short of the leg's end, and not at its very beginning, which is where a robot at a node stands.
+    // Excludes both ends of the leg; its very beginning is where a robot at a node stands.
     (dot / length_mm).clamp(1e-3 * length_mm, 0.999 * length_mm)
 }
 
@@ -295,7 +295,7 @@ mod tests {
     }
 
     #[test]
-    fn the_robot_is_at_the_node_it_names() {
+    fn the_reported_node_is_at_the_position_of_the_robot() {
         let plan = Plan::built_in("office").unwrap();
         let mut simulation = Simulation::new(&plan, RobotModel::default().with_noise(0.0), 4).unwrap();
         let map = simulation.true_map().clone();

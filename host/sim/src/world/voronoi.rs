@@ -1,8 +1,9 @@
 //! The true map of a floor plan: its generalised Voronoi graph.
 //!
-//! The exact Voronoi diagram of the wall surfaces (crate `boostvoronoi`) is cut down to what a robot can drive: edges
-//! inside walls go, and so do the edges that end in a concave corner, where no robot fits. What is left where three or
-//! more obstacles were equidistant is a node, also where only one or two edges are left (the end of a corridor, a bend).
+//! The exact Voronoi diagram of the wall surfaces (crate `boostvoronoi`) is reduced to what a robot can drive. Edges
+//! inside walls are removed, and so are edges that end in a concave corner, where no robot fits. A remaining point
+//! where three or more obstacles were equidistant is a node, even when only one or two edges remain (the end of a
+//! corridor, a bend).
 
 use std::fmt;
 
@@ -11,19 +12,19 @@ use boostvoronoi::prelude::{Builder, BvError, Diagram, EdgeIndex, SourceCategory
 use super::plan::Face;
 use super::{Plan, Point};
 
-/// Points of the diagram this close are one, in millimetres.
+/// Points of the diagram this close are merged, in millimetres.
 const SAME_MM: f64 = 1.0;
-/// Curved edges are cut into pieces no longer than this, in millimetres.
+/// Curved edges are split into segments no longer than this, in millimetres.
 const PIECE_MM: f64 = 25.0;
 
 /// A place of the true map: a meet point of the generalised Voronoi graph.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TrueNode {
-    /// Where it is.
+    /// Position of the node.
     pub position: Point,
     /// Distance to the closest obstacles, in millimetres.
     pub radius_mm: f64,
-    /// How many drivable edges end here.
+    /// Number of drivable edges that end here.
     pub degree: usize,
 }
 
@@ -32,11 +33,11 @@ pub struct TrueNode {
 pub struct TrueEdge {
     /// The nodes at its ends.
     pub nodes: [usize; 2],
-    /// The way from the first node to the second.
+    /// Polyline from the first node to the second.
     pub way: Vec<Point>,
 }
 
-/// The true places of a floor plan and their connections, as far as they can be reached from the start.
+/// The true places of a floor plan and their connections, as far as they are reachable from the start.
 #[derive(Clone, Debug, PartialEq)]
 pub struct TrueMap {
     /// The places.
@@ -72,13 +73,13 @@ impl From<BvError> for VoronoiError {
     }
 }
 
-/// A piece of the diagram between two of its points.
+/// A segment of the diagram between two of its points.
 struct Piece {
     ends: [usize; 2],
     way: Vec<Point>,
 }
 
-/// The diagram's points and the pieces between them, in free space.
+/// The points of the diagram and the segments between them, in free space.
 #[derive(Default)]
 struct Skeleton {
     points: Vec<Point>,
@@ -86,10 +87,10 @@ struct Skeleton {
 }
 
 impl TrueMap {
-    /// The true map of a plan.
+    /// Computes the true map of a plan.
     ///
     /// # Errors
-    /// When the start does not reach any meet point.
+    /// When the diagram cannot be computed, or no meet point is reachable from the start.
     pub fn of(plan: &Plan) -> Result<Self, VoronoiError> {
         let faces = plan.faces();
         let mut skeleton = Skeleton::of(plan, &faces)?;
@@ -148,7 +149,7 @@ impl Skeleton {
         Ok(skeleton)
     }
 
-    /// The index of a point, which is added when it is not there yet.
+    /// Index of a point, which is inserted when it is new.
     fn point(&mut self, point: Point) -> usize {
         let known = self.points.iter().position(|known| known.distance_mm(point) < SAME_MM);
         known.unwrap_or_else(|| {
@@ -157,14 +158,14 @@ impl Skeleton {
         })
     }
 
-    /// How many pieces end at each point.
+    /// Number of segments that end at each point.
     fn degrees(&self) -> Vec<usize> {
         let mut degrees = vec![0; self.points.len()];
         self.pieces.iter().flat_map(|piece| piece.ends).for_each(|end| degrees[end] += 1);
         degrees
     }
 
-    /// Drops what leads from a meet point to nothing but a concave corner that was dropped.
+    /// Removes the branches that lead from a meet point only to removed concave corners.
     fn prune(&mut self, equidistant: &[usize]) {
         loop {
             let degrees = self.degrees();
@@ -176,7 +177,7 @@ impl Skeleton {
         }
     }
 
-    /// Drops what is not connected to the piece nearest to a point.
+    /// Removes everything that is not connected to the segment nearest to a point.
     fn keep_reachable(&mut self, start: Point) {
         let to_start = |piece: &&Piece| {
             let distances = piece.way.windows(2).map(|leg| leg[0].towards(leg[1], 0.5).distance_mm(start));
@@ -194,7 +195,7 @@ impl Skeleton {
         self.pieces.retain(|piece| seen[piece.ends[0]]);
     }
 
-    /// The chains of pieces from node to node.
+    /// The chains of segments from node to node.
     fn chains(&self, node_of: &[Option<usize>]) -> Vec<TrueEdge> {
         let mut used = vec![false; self.pieces.len()];
         let mut edges = Vec::new();
@@ -218,7 +219,7 @@ impl Skeleton {
         edges
     }
 
-    /// Takes an unused piece away from a point: its way, and the point at its other end.
+    /// Takes an unused segment at a point and returns its polyline and the point at its other end.
     fn leave(&self, point: usize, used: &mut [bool]) -> Option<(Vec<Point>, usize)> {
         let index = (0..self.pieces.len()).find(|index| !used[*index] && self.pieces[*index].ends.contains(&point))?;
         used[index] = true;
@@ -299,7 +300,7 @@ mod tests {
     }
 
     #[test]
-    fn every_point_of_every_way_is_as_far_from_two_obstacles() {
+    fn every_point_of_an_edge_is_equidistant_from_two_obstacles() {
         for (name, text) in Plan::BUILT_IN {
             let plan = Plan::parse(text).unwrap();
             let map = TrueMap::of(&plan).unwrap();
