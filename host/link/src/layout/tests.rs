@@ -108,7 +108,7 @@ fn samples() -> Vec<TopologicalMap> {
 }
 
 #[test]
-fn a_complete_planar_map_is_drawn_without_conflicts() {
+fn a_planar_map_arranged_at_once_is_drawn_without_conflicts() {
     for map in samples() {
         let mut layout = Layout::new();
         layout.arrange(&map);
