@@ -1,12 +1,13 @@
-//! The monitor before a simulated robot: how long a place takes to the screen, or the screen as text.
+//! Runs the monitor with a simulated robot: measures the latency from a place to the screen, or prints the screen as
+//! text.
 //!
 //! ```sh
 //! cargo run --release --package toposlam-cli --example monitor -- latency 200 1     # places, speed
 //! cargo run --release --package toposlam-cli --example monitor -- screenshot 80 24 40    # columns, rows, places
 //! ```
 //!
-//! `latency` takes the terminal. The time of a place begins when the robot's bytes of it are written to the socket, and ends when
-//! the frame that shows the robot at it, or at a later place, has been written to the terminal.
+//! `latency` uses the terminal. The time of a place starts when the robot's bytes are written to the socket, and ends
+//! when the frame that shows the robot at that place, or at a later one, is written to the terminal.
 
 use std::collections::BTreeMap;
 use std::ops::ControlFlow;
@@ -24,7 +25,7 @@ use toposlam_link::listener::Listener;
 use toposlam_sim::exploration::Exploration;
 use toposlam_sim::world::{Plan, RobotModel};
 
-/// Ring frames in a second of the robot's time.
+/// Ring frames per second of robot time.
 const FRAMES_PER_SECOND: f64 = 10.0;
 
 fn main() -> anyhow::Result<()> {
@@ -36,7 +37,7 @@ fn main() -> anyhow::Result<()> {
     }
 }
 
-/// When the bytes of each place were written that has not been drawn yet.
+/// Time at which the bytes of each place were written, for places not yet drawn.
 type Written = Arc<Mutex<BTreeMap<u32, Instant>>>;
 
 fn latency(places: usize, speed: f64) -> anyhow::Result<()> {

@@ -1,7 +1,7 @@
-//! Runs the firmware in an emulated STM32F405 and plays the world around it.
+//! Runs the firmware in an emulated STM32F405 and simulates its environment.
 //!
-//! QEMU's USART2 leads to the model of the sensor bus, USART1 to the caller. The emulator's machine has no I2C, so the
-//! firmware reaches its sensors through the SC18IM700 bridge, byte for byte as on a robot.
+//! QEMU's USART2 connects to the model of the sensor bus, USART1 to the caller. The emulated machine has no I2C, so the
+//! firmware reaches its sensors through the SC18IM700 bridge, with the same bytes as on a robot.
 
 use std::{
     fs,
@@ -24,43 +24,44 @@ use toposlam::ring::RingFrame;
 use toposlam_sim::chip::Srf08Bank;
 use toposlam_sim::injector::{BridgeCounts, FaultRates, FaultyBridge};
 
-/// The RAM of the STM32F405 that the stack grows down in.
+/// RAM of the STM32F405 that contains the stack, which grows downwards.
 const RAM_START: u32 = 0x2000_0000;
 const RAM_BYTES: usize = 128 * 1024;
-/// What `cortex-m-rt` paints the stack with before `main`.
+/// Pattern with which `cortex-m-rt` fills the stack before `main`.
 const STACK_PAINT: [u8; 4] = 0xCCCC_CCCC_u32.to_le_bytes();
 const BUFFER_BYTES: usize = 4096;
-/// The firmware waits for a byte that was lost until it has been woken so many times; the clock alone takes 20 s for that. With
-/// faults, zeros on USART1 wake it whenever the line to the bridge was quiet for this long: between frames zeros mean nothing.
+/// After a lost byte the firmware waits for a fixed number of wake-ups, which takes 20 s with the clock alone. With
+/// faults, zeros on USART1 wake it whenever the line to the bridge has been quiet for this long; between frames zeros
+/// have no meaning.
 const WAKE_AFTER: Duration = Duration::from_millis(1);
-/// Computers do not wait for less than some four milliseconds; so many zeros each time bring a lost byte down to a quarter of a
-/// second.
+/// Zeros per wake-up. A host cannot wait less than about four milliseconds; this many zeros reduce the delay of a lost
+/// byte to a quarter of a second.
 const WAKE: [u8; 4] = [0; 4];
 
-/// What to run and for how long.
+/// Configuration of a run.
 #[derive(Clone, Debug)]
 pub struct Emulation {
-    /// The emulator, a name on the search path or a file.
+    /// The emulator: a name on the search path, or a file.
     pub qemu: PathBuf,
-    /// The firmware image, as it would be flashed.
+    /// The firmware image, as flashed.
     pub elf: PathBuf,
-    /// How often a sonar reads as still ranging before it answers.
+    /// Number of times a sonar reads as still ranging before it answers.
     pub ranging_polls: u32,
-    /// The whole run is given up after this long.
+    /// Timeout of the whole run.
     pub timeout: Duration,
-    /// How many frames without any sensor follow the last frame of the world, so that the firmware can repeat what it
-    /// has to say; then the sensor bus falls silent.
+    /// Number of frames without any sensor after the last frame of the world, so that the firmware can repeat its
+    /// messages; then the sensor bus is silent.
     pub blind_frames: u64,
-    /// After that the run ends when USART1 has been quiet for this long.
+    /// The run ends when USART1 has then been quiet for this long.
     pub quiet: Duration,
-    /// Faults between the firmware and its sensors, from the world's first frame to its last.
+    /// Fault rates between the firmware and its sensors, from the world's first frame to its last.
     pub faults: FaultRates,
-    /// The seed of the faults.
+    /// Seed of the faults.
     pub fault_seed: u64,
 }
 
 impl Emulation {
-    /// The firmware in the emulator found on the search path, given up after ten minutes.
+    /// Runs the firmware in the emulator on the search path, with a timeout of ten minutes.
     pub fn new(elf: impl Into<PathBuf>) -> Self {
         Self {
             qemu: "qemu-system-arm".into(),
@@ -74,13 +75,14 @@ impl Emulation {
         }
     }
 
-    /// Runs the firmware in the world until the frames are used up and USART1 is quiet, or `received` breaks off, or the
-    /// firmware ends on its own. `received` gets what the firmware sends on USART1, in pieces of any length; what it puts into its
+    /// Runs the firmware until the frames are used up and USART1 is quiet, `received` breaks, or the firmware ends by
+    /// itself. `received` gets the firmware's output on USART1 in pieces of any length; bytes that it appends to its
+    /// second argument are sent to the firmware.
     /// second argument is sent to the firmware.
     ///
     /// # Errors
-    /// When the emulator cannot be started or talked to, when the firmware ends with a failure (a panic or a hard
-    /// fault), and when the time is up.
+    /// If the emulator cannot be started or its connection fails, if the firmware ends with a failure (a panic or a
+    /// hard fault), and after the timeout.
     pub fn run(
         &self,
         frames: impl FnMut() -> Option<RingFrame<16>> + Send,
@@ -104,7 +106,7 @@ impl Emulation {
             let bus = scope.spawn(|| self.play_bus(usart2, frames, &progress, &to_firmware));
             let ending =
                 self.listen_until_the_end(&mut machine, &mut usart1, &progress, deadline, &to_firmware, &mut received);
-            // Closing the line ends the thread that waits on it.
+            // Closing the line ends the thread that reads it.
             let _ = stop.shutdown(std::net::Shutdown::Both);
             match bus.join() {
                 Ok(counts) => ending.map(|ending| (ending, counts)),
@@ -128,7 +130,7 @@ impl Emulation {
         }
     }
 
-    /// Answers the firmware's bytes on USART2 as the bridge and the rangers behind it would, until the line closes.
+    /// Answers the firmware's bytes on USART2 like the bridge and the rangers behind it, until the line closes.
     fn play_bus(
         &self,
         line: TcpStream,
@@ -207,7 +209,7 @@ impl Emulation {
             }
             let now = Instant::now();
             if !progress.world_over.load(Ordering::Acquire) {
-                // The quiet time counts from the end of the world at the earliest.
+                // The quiet time starts at the end of the world at the earliest.
                 last_byte = now;
             } else if now.duration_since(last_byte) >= self.quiet {
                 return Ok(Ending::WorldOver);
@@ -226,11 +228,11 @@ impl Emulation {
 /// Why a run ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Ending {
-    /// The frames were used up and the firmware had no more to say.
+    /// The frames were used up and USART1 was quiet.
     WorldOver,
-    /// The caller broke it off.
+    /// The caller ended the run.
     BrokenOff,
-    /// The firmware ended the emulator itself.
+    /// The firmware ended the emulator.
     Exited(ExitStatus),
 }
 
@@ -240,20 +242,20 @@ impl Ending {
     }
 }
 
-/// How a run went.
+/// Results of a run.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Outcome {
     /// Why it ended.
     pub ending: Ending,
-    /// How many ring frames the firmware read.
+    /// Number of ring frames that the firmware read.
     pub frames: u64,
-    /// How many bytes the firmware sent to the sensor bus.
+    /// Number of bytes that the firmware sent to the sensor bus.
     pub bus_bytes: u64,
-    /// The most stack that the firmware ever used, from the paint that is left.
+    /// Maximum stack use of the firmware in bytes, from the remaining fill pattern.
     pub stack_high_water_bytes: Option<usize>,
-    /// What was done between the firmware and its sensors.
+    /// Faults injected between the firmware and its sensors.
     pub bridge: BridgeCounts,
-    /// How long the run took on this computer.
+    /// Duration of the run on the host.
     pub seconds: f64,
 }
 
@@ -264,7 +266,7 @@ struct Progress {
     world_over: AtomicBool,
 }
 
-/// The running emulator; it is killed when it is dropped.
+/// The running emulator; it is killed on drop.
 struct Machine {
     child: Child,
 }
@@ -323,7 +325,7 @@ impl Machine {
     }
 
     fn kill(&mut self) {
-        // Either fails only when the emulator has ended already.
+        // Either fails only if the emulator has already ended.
         let _ = self.child.kill();
         let _ = self.child.wait();
     }
@@ -339,7 +341,7 @@ fn listen() -> anyhow::Result<TcpListener> {
     TcpListener::bind("127.0.0.1:0").context("opening a local port for the emulator")
 }
 
-/// Writes all of some bytes at once, so that nobody else's come in between.
+/// Writes all bytes at once, so that bytes of other threads cannot come in between.
 fn send(line: &Mutex<TcpStream>, bytes: &[u8]) -> io::Result<()> {
     let mut line = line.lock().map_err(|_| io::Error::other("another thread failed"))?;
     line.write_all(bytes)
@@ -349,7 +351,7 @@ fn is_timeout(error: &io::Error) -> bool {
     matches!(error.kind(), io::ErrorKind::WouldBlock | io::ErrorKind::TimedOut | io::ErrorKind::Interrupted)
 }
 
-/// Reads the machine's RAM through QEMU's monitor and finds how deep the stack ever was.
+/// Reads the machine's RAM through QEMU's monitor and returns the maximum stack depth.
 fn stack_high_water(mut monitor: TcpStream) -> anyhow::Result<usize> {
     monitor.set_read_timeout(Some(Duration::from_secs(10)))?;
     let dump =
@@ -357,7 +359,7 @@ fn stack_high_water(mut monitor: TcpStream) -> anyhow::Result<usize> {
     writeln!(monitor, "stop")?;
     writeln!(monitor, "pmemsave {RAM_START:#x} {RAM_BYTES} \"{}\"", dump.display())?;
     writeln!(monitor, "quit")?;
-    // The monitor closes the line when it has done all of it.
+    // The monitor closes the line after it has executed all commands.
     let mut said = Vec::new();
     let _ = monitor.read_to_end(&mut said);
     let ram = fs::read(&dump).context("reading the machine's memory")?;
@@ -365,7 +367,7 @@ fn stack_high_water(mut monitor: TcpStream) -> anyhow::Result<usize> {
     painted_stack(&ram).context("the stack is not painted")
 }
 
-/// The bytes above the longest stretch of paint in an image of the RAM: what the stack has used from the top.
+/// Number of bytes above the longest run of the fill pattern in an image of the RAM: the used part of the stack.
 fn painted_stack(ram: &[u8]) -> Option<usize> {
     let (mut longest, mut end_of_longest, mut run) = (0, 0, 0);
     for (index, word) in ram.chunks_exact(4).enumerate() {
@@ -382,7 +384,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_stack_reaches_from_the_top_down_to_the_longest_stretch_of_paint() {
+    fn the_used_stack_ends_at_the_longest_run_of_the_fill_pattern() {
         let mut ram = vec![0; 64];
         ram[4..8].copy_from_slice(&STACK_PAINT);
         for word in ram[16..40].chunks_exact_mut(4) {
@@ -393,7 +395,7 @@ mod tests {
     }
 
     #[test]
-    fn a_missing_image_is_an_error_that_says_how_to_build_it() {
+    fn a_missing_image_gives_an_error_with_the_build_command() {
         let error = Emulation::new("no-such-image").run(|| None, |_, _| ControlFlow::Continue(())).unwrap_err();
         assert!(error.to_string().contains("cargo firmware"));
     }

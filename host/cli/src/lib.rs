@@ -1,8 +1,8 @@
-//! What the `toposlam` command is made of: the emulated robot, the views of a robot on a line, and pictures.
+//! Components of the `toposlam` command: the emulated robot, the views of a robot on a line, and drawings.
 //!
-//! [`emulator`] runs the firmware with the frames of a simulated building. [`monitor`] shows a robot in a terminal, [`serve`] in
-//! browsers, `publish` (feature `mqtt`) on an MQTT broker; [`fleet`] listens to a thousand robots at once. [`picture`] draws a map over
-//! its floor plan, and [`progress`] a bar.
+//! [`emulator`] runs the firmware in a simulated building. [`monitor`] shows a robot in a terminal, [`serve`] in
+//! browsers, and `publish` (feature `mqtt`) publishes it to an MQTT broker; [`fleet`] monitors a thousand robots at
+//! once. [`picture`] draws a map over its floor plan, and [`progress`] a progress bar.
 
 pub mod emulator;
 pub mod fleet;
@@ -13,7 +13,7 @@ pub mod progress;
 pub mod publish;
 pub mod serve;
 
-/// The code in the guide to the stream is compiled as a test.
+/// Compiles the code of the stream guide as a test.
 #[cfg(doctest)]
 #[doc = include_str!("../../../docs/stream.md")]
 struct Stream;

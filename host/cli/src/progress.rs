@@ -1,14 +1,14 @@
-//! A progress bar on the standard error, for as long as that is a terminal.
+//! Progress bar on the standard error, if that is a terminal.
 
 use std::io::{IsTerminal, Write, stderr};
 use std::sync::Mutex;
 use std::time::{Duration, Instant};
 
-/// The bar is drawn again after this long at the earliest.
+/// Minimum interval between two drawings of the bar.
 const REDRAW: Duration = Duration::from_millis(100);
 const BAR_CELLS: usize = 40;
 
-/// A bar that counts to a total, from any thread. It disappears when it is dropped.
+/// A progress bar for any number of threads. It disappears when it is dropped.
 #[derive(Debug)]
 pub struct Progress {
     title: String,
@@ -26,13 +26,13 @@ struct State {
 }
 
 impl Progress {
-    /// A bar at 0 of `total`; `unit` is the plural of what it counts.
+    /// A bar at 0 of `total`; `unit` is the plural of the counted items.
     pub fn new(title: impl Into<String>, total: usize, unit: &'static str) -> Self {
         let is_terminal = stderr().is_terminal();
         Self { title: title.into(), unit, total, start: Instant::now(), is_terminal, state: Mutex::default() }
     }
 
-    /// Counts one more.
+    /// Increments the count.
     pub fn increment(&self) {
         let Ok(mut state) = self.state.lock() else { return };
         state.done += 1;
@@ -75,7 +75,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_bar_is_filled_in_proportion() {
+    fn the_bar_is_filled_in_proportion_to_the_count() {
         let progress = Progress::new("office", 80, "places");
         let line = progress.line(20);
         assert_eq!((line.matches('█').count(), line.matches('░').count()), (10, 30));

@@ -1,4 +1,4 @@
-//! The command as a person meets it: what it prints, what it writes, and how it fails.
+//! The command line: output, files and errors.
 
 mod monitor;
 
@@ -36,7 +36,7 @@ fn simulate_prints_a_line_for_each_place_and_draws_the_map() {
 }
 
 #[test]
-fn a_fleet_of_another_process_is_heard_without_loss_and_its_cost_told() {
+fn a_fleet_of_another_process_is_monitored_without_loss() {
     let text = printed(&toposlam(&["fleet", "--simulate", "3", "--seconds", "1", "--speed", "0"]));
     assert!(text.contains("3 connected, 0 closed, 0 failed"), "{text}");
     assert!(text.lines().any(|line| line.starts_with("in all: ") && line.ends_with("; 0 frames lost, 0 damaged")));
@@ -58,7 +58,7 @@ fn replay_maps_a_recording() {
     let header = columns.join(",");
     std::fs::write(&ring, format!("sonars = 8\nunit = \"mm\"\nmax_range = 6000\nstep_deg = 45\ncolumns = {columns:?}"))
         .unwrap();
-    // To and fro between the ends of a corridor, one 1.6 m wide and one 2.4 m.
+    // Back and forth between the ends of a corridor, one 1.6 m wide and one 2.4 m.
     let mut recording = header;
     for beside_mm in [800, 1200, 800] {
         for step in -50_i32..=50 {
@@ -76,7 +76,7 @@ fn replay_maps_a_recording() {
 }
 
 #[test]
-fn what_cannot_be_read_or_started_is_named_and_fails() {
+fn unreadable_files_and_missing_programs_are_named_in_the_error() {
     assert!(complaint(&toposlam(&["simulate", "--plan", "castle"])).contains("castle"));
     assert!(complaint(&toposlam(&["replay", "nowhere.csv", "--ring", "scitos-g5"])).contains("nowhere.csv"));
     assert!(complaint(&toposlam(&["emulate", "--elf", "nowhere.elf"])).contains("nowhere.elf"));
@@ -85,7 +85,8 @@ fn what_cannot_be_read_or_started_is_named_and_fails() {
     assert!(complaint(&toposlam(&arguments)).contains("no-such-emulator"));
 }
 
-/// Answers one client on a local port; gives the name of the line and, after the client is gone, the commands that came.
+/// Serves one client on a local port; returns the name of the line and, after the client has disconnected, the received
+/// commands.
 fn robot(
     mut answer: impl FnMut(&wire::Command) -> Outcome + Send + 'static,
 ) -> (String, std::thread::JoinHandle<Vec<wire::Command>>) {
@@ -106,13 +107,13 @@ fn robot(
                 answer(command)
             });
             let row = Row { vertex: 0, radius_mm: 1172, visits: 12, neighbours: 1 };
-            // CRC-32 of the map with that one vertex, see docs/wire.md.
+            // CRC-32 of the map with this one vertex, see docs/wire.md.
             let digest =
                 crc32(&[&[1][..], &1172_u16.to_le_bytes(), &12_u32.to_le_bytes(), &1_u64.to_le_bytes()].concat());
             let map = [Message::Row(row), Message::Map { vertices: 1, edges: 1, digest }];
             for message in reply.map(Message::Reply).into_iter().chain(map) {
                 let frame = encoder.encode(&message, &mut [0; MAX_FRAME_BYTES]).unwrap().to_vec();
-                // A client that has its answer does not wait for the rest.
+                // A client that has its reply does not wait for the rest.
                 if stream.write_all(&frame).is_err() {
                     return commands;
                 }
@@ -123,7 +124,7 @@ fn robot(
 }
 
 #[test]
-fn command_tells_a_robot_over_its_line_what_to_do_and_prints_what_it_says() {
+fn command_sends_commands_and_prints_the_replies() {
     let info = Info {
         version: Version { major: 1, minor: 2, patch: 3 },
         boot: 17,
@@ -163,7 +164,7 @@ fn command_tells_a_robot_over_its_line_what_to_do_and_prints_what_it_says() {
 }
 
 #[test]
-fn command_writes_a_snapshot_to_a_file_and_sends_it_back() {
+fn command_saves_and_restores_a_snapshot() {
     let directory = tempfile::tempdir().unwrap();
     let file = directory.path().join("robot.snapshot");
     let file = file.to_str().unwrap();
@@ -189,7 +190,7 @@ fn command_writes_a_snapshot_to_a_file_and_sends_it_back() {
 }
 
 #[test]
-fn command_says_why_a_robot_did_not_do_it() {
+fn command_reports_why_it_failed() {
     let (line, _) = robot(|_| Refusal::UnknownVertex.into());
     let text = complaint(&toposlam(&["command", &line, "go-to", "99"]));
     assert!(text.contains("the map has no such vertex"), "{text}");
@@ -205,7 +206,7 @@ fn command_says_why_a_robot_did_not_do_it() {
 }
 
 #[test]
-fn export_writes_the_map_of_a_recording_and_says_what_is_wrong_with_it() {
+fn export_writes_the_map_of_a_stream_and_reports_its_gaps() {
     let directory = tempfile::tempdir().unwrap();
     let file = directory.path().join("robot.bin");
     let name = file.to_str().unwrap();
@@ -225,7 +226,7 @@ fn export_writes_the_map_of_a_recording_and_says_what_is_wrong_with_it() {
 
 #[cfg(not(all(feature = "mqtt", feature = "recording")))]
 #[test]
-fn a_command_that_the_build_leaves_out_names_its_feature() {
+fn a_command_omitted_from_the_build_names_its_feature() {
     for (command, feature, is_built) in [
         ("record", "recording", cfg!(feature = "recording")),
         ("play", "recording", cfg!(feature = "recording")),

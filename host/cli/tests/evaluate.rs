@@ -1,4 +1,4 @@
-//! `toposlam evaluate` as a person or a script runs it.
+//! `toposlam evaluate` as run by a user or a script.
 
 use serde_json::{Value, json};
 use std::{
@@ -18,7 +18,7 @@ fn evaluate(arguments: &[&str], threads: &str) -> Output {
         .unwrap()
 }
 
-/// The one JSON object on the standard output, without the times, which differ from run to run.
+/// The JSON object on the standard output, without the times, which differ from run to run.
 fn report(arguments: &[&str], threads: &str) -> Value {
     let output = evaluate(arguments, threads);
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
@@ -166,21 +166,21 @@ fn the_same_seed_gives_the_same_report_on_any_number_of_threads() {
 }
 
 #[test]
-fn a_case_gives_the_same_results_whatever_is_evaluated_beside_it() {
+fn the_results_of_a_case_do_not_depend_on_other_cases() {
     let run = |cases: &[&str]| report(&[&["--filter", "paper", "--paths", "2", "--length", "12"], cases].concat(), "2");
     let alone = run(&["--environment", SURROGATE]);
     assert_eq!(run(&["--environment", TABLE_I, SURROGATE, "--family", FAMILY])["rows"][1], alone["rows"][0]);
 }
 
 #[test]
-fn an_earlier_check_point_changes_nothing_of_a_later_one() {
+fn an_earlier_check_point_does_not_change_a_later_one() {
     let run =
         |lengths| report(&["--environment", SURROGATE, "--paths", "3", "--filter", "paper", "--lengths", lengths], "2");
     assert_eq!(run("20,60")["rows"][1], run("60")["rows"][0]);
 }
 
 #[test]
-fn a_building_of_distinct_places_is_mapped_exactly_when_vertices_are_dear() {
+fn distinct_places_are_mapped_exactly_with_a_high_vertex_penalty() {
     let directory = tempfile::tempdir().unwrap();
     let file = directory.path().join("distinct.toml");
     let places = [(1, 700), (2, 1400), (3, 2100), (4, 2800)];
@@ -201,7 +201,7 @@ fn a_building_of_distinct_places_is_mapped_exactly_when_vertices_are_dear() {
 }
 
 #[test]
-fn the_table_tells_the_seed_and_names_every_row() {
+fn the_table_shows_the_seed_and_names_every_row() {
     let arguments = ["--environment", TABLE_I, "--family", FAMILY, "--paths", "1", "--lengths", "4,8", "--seed", "5"];
     let output = evaluate(&[arguments.as_slice(), &["--format", "table"]].concat(), "1");
     let table = String::from_utf8(output.stdout).unwrap();
@@ -217,7 +217,7 @@ fn the_table_tells_the_seed_and_names_every_row() {
 }
 
 #[test]
-fn exported_paths_are_what_the_filter_sees_and_their_truth() {
+fn exported_paths_contain_the_observations_and_the_ground_truth() {
     let directory = tempfile::tempdir().unwrap();
     let mut arguments = vec!["--environment", TABLE_I, "--family", FAMILY, "--family", FAMILY, "--paths", "4"];
     arguments.extend(["--lengths", "10,30", "--hints", "both,missing=0.3", "--seed", "9", "--fingerprint-bits", "8"]);
@@ -238,7 +238,7 @@ fn exported_paths_are_what_the_filter_sees_and_their_truth() {
     assert_eq!(csv(family, 2), csv(&again, 2));
     let environment =
         |path| json_file(&directory.path().join(family).join(format!("{path}.truth.json")))["labels"].clone();
-    assert_eq!(environment(0), environment(3), "path 3 is in the first environment of three again");
+    assert_eq!(environment(0), environment(3), "path 3 is again in the first of three environments");
     assert_ne!(environment(0), environment(1));
 }
 
@@ -255,7 +255,7 @@ fn check_exported_path(folder: &Path, path: u64) {
     assert_eq!((visits.len(), places.len()), (30, 30));
     for (step, visit) in visits.iter().enumerate() {
         assert_eq!(visit[0], step.to_string());
-        // Within five deviations, half of a level of 32 mm, and the rounding.
+        // Within five standard deviations, half a level of 32 mm, and the rounding.
         let label = &truth["labels"][places[step]];
         let (mean_mm, sd_mm) = (label[0].as_f64().unwrap(), label[1].as_f64().unwrap());
         assert!((visit[1].parse::<f64>().unwrap() - mean_mm).abs() <= 5.0 * sd_mm + 18.0);
@@ -298,7 +298,7 @@ fn plots_show_both_filters_on_the_same_paths() {
 }
 
 #[test]
-fn what_cannot_be_evaluated_is_refused_with_its_reason() {
+fn invalid_arguments_are_refused_with_a_reason() {
     let missing = refusal(&["--environment", "nowhere.toml"]);
     assert!(missing.contains("--environment nowhere.toml") && missing.contains("cannot read the environment"));
     assert!(refusal(&["--placements", "1,2,nowhere.toml"]).contains("--placements nowhere.toml"));

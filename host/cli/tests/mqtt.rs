@@ -1,4 +1,4 @@
-//! `publish` and a real broker, mosquitto: what a subscriber gets, and what becomes of robot and broker when one is gone.
+//! `publish` with a real broker, mosquitto: what a subscriber receives, and the behaviour when robot or broker is gone.
 #![cfg(feature = "mqtt")]
 
 use std::io::Write;
@@ -20,12 +20,12 @@ use toposlam_link::topology::TopologicalMap;
 use toposlam_sim::exploration::Exploration;
 use toposlam_sim::world::{Plan, RobotModel};
 
-/// When something that has to happen has not.
+/// Timeout of every wait in these tests.
 const DEADLINE: Duration = Duration::from_secs(60);
 const SHORT: Duration = Duration::from_millis(2);
 const PLACES: usize = 12;
 
-/// A process that ends with the test.
+/// A process that is killed at the end of the test.
 struct Process(Child);
 
 impl Drop for Process {
@@ -35,7 +35,7 @@ impl Drop for Process {
     }
 }
 
-/// Where Debian puts the broker, which is not on everybody's path.
+/// The path of the broker on Debian, which is not in every user's `PATH`.
 fn mosquitto() -> Option<&'static str> {
     let found = ["mosquitto", "/usr/sbin/mosquitto"]
         .into_iter()
@@ -71,7 +71,7 @@ struct Subscriber {
 }
 
 impl Subscriber {
-    /// Subscribes to everything of a robot.
+    /// Subscribes to all topics of a robot.
     fn connect(port: u16, name: &str) -> Self {
         let mut options = MqttOptions::new(name, "127.0.0.1", port);
         options.set_max_packet_size(1 << 17, 1 << 17);
@@ -85,7 +85,7 @@ impl Subscriber {
     fn wait_for(&mut self, mut is_it: impl FnMut(&Publish) -> bool) -> Publish {
         let start = Instant::now();
         loop {
-            assert!(start.elapsed() < DEADLINE, "it did not come");
+            assert!(start.elapsed() < DEADLINE, "no such message arrived");
             if let Event::Incoming(Packet::Publish(message)) = self.connection.recv_timeout(DEADLINE).unwrap().unwrap()
                 && is_it(&message)
             {
@@ -103,7 +103,7 @@ impl Subscriber {
     }
 }
 
-/// Whether a message holds that map, every bit of it.
+/// Whether a message contains exactly this map.
 fn is_map(message: &Publish, map: &TopologicalMap) -> bool {
     let json: Value = serde_json::from_slice(&message.payload).unwrap();
     let number = |value: &Value| value.as_u64().unwrap();
@@ -117,7 +117,7 @@ fn is_map(message: &Publish, map: &TopologicalMap) -> bool {
         && number(&json["digest"]) == u64::from(map.digest())
 }
 
-/// A robot that explores once someone listens, and then only repeats what it knows.
+/// A robot that explores once a client is connected, and then only repeats its state.
 fn robot() -> String {
     let mut broadcast = Broadcast::bind("127.0.0.1:0").unwrap();
     let line = format!("tcp:{}", broadcast.address().unwrap());
@@ -141,7 +141,7 @@ fn robot() -> String {
     line
 }
 
-/// Lets a robot explore until it has said all of its map: the same one each time.
+/// Runs a deterministic exploration until the robot has sent its whole map.
 fn explored(buffer: &mut [u8], mut say: impl FnMut(&[u8])) -> Exploration<'_> {
     let plan = Plan::built_in("flat").unwrap();
     let mut exploration = Exploration::start(&plan, RobotModel::default(), 1, buffer).unwrap();
@@ -160,7 +160,7 @@ fn map(exploration: &Exploration<'_>) -> TopologicalMap {
 }
 
 #[test]
-fn whoever_subscribes_late_gets_the_robots_map_and_learns_when_the_publisher_is_killed() {
+fn a_late_subscriber_gets_the_map_and_the_last_will() {
     let Some(program) = mosquitto() else { return };
     let directory = tempfile::tempdir().unwrap();
     let port = free_port();
@@ -200,7 +200,7 @@ fn whoever_subscribes_late_gets_the_robots_map_and_learns_when_the_publisher_is_
 }
 
 #[test]
-fn a_broker_that_was_away_gets_the_newest_map_and_what_it_missed_is_counted() {
+fn a_reconnected_broker_gets_the_newest_map_and_drops_are_counted() {
     let Some(program) = mosquitto() else { return };
     let directory = tempfile::tempdir().unwrap();
     let port = free_port();
@@ -235,7 +235,7 @@ fn a_broker_that_was_away_gets_the_newest_map_and_what_it_missed_is_counted() {
 }
 
 #[test]
-fn a_broker_that_does_not_read_holds_nobody_up() {
+fn a_broker_that_does_not_read_blocks_nobody() {
     const SOME: u64 = 1000;
     let broker = TcpListener::bind("127.0.0.1:0").unwrap();
     let address = format!("mqtt://{}", broker.local_addr().unwrap());
@@ -244,7 +244,7 @@ fn a_broker_that_does_not_read_holds_nobody_up() {
         sender.send(news).unwrap_or_default();
     });
     let (mut connection, _) = broker.accept().unwrap();
-    // The connection is accepted, and nothing of it read.
+    // The connection is accepted, but never read.
     connection.write_all(&[0x20, 2, 0, 0]).unwrap();
     assert_eq!(news.recv_timeout(DEADLINE).unwrap(), BrokerNews::Connected);
     let (mut listener, mut events) = (Listener::new(), 0);

@@ -1,4 +1,4 @@
-//! `record` and `play` as a person meets them: how a recording ends, and that it can be heard like a robot.
+//! `record` and `play` as run by a user: how a recording ends, and that it can be replayed as a robot.
 
 #![cfg(feature = "recording")]
 
@@ -20,7 +20,7 @@ fn printed(arguments: &[&str]) -> String {
     String::from_utf8(output.stdout).unwrap()
 }
 
-/// A process that ends with the test.
+/// A process that is killed at the end of the test.
 struct Process(Child);
 
 impl Drop for Process {
@@ -30,14 +30,14 @@ impl Drop for Process {
     }
 }
 
-/// What is at the end of a line of text that a program prints first: `… tcp:HOST:PORT`.
+/// The name of the line in the first line of a program's output: `… tcp:HOST:PORT`.
 fn address(output: impl Read) -> String {
     let mut text = String::new();
     BufReader::new(output).read_line(&mut text).unwrap();
     text.split_whitespace().last().unwrap().to_owned()
 }
 
-/// A simulated robot that lives fast, and its line.
+/// A simulated robot at high speed, and its line.
 fn robot() -> (Process, String) {
     let mut robot = toposlam(&["robot", "--listen", "127.0.0.1:0", "--plan", "flat", "--speed", "50"])
         .stdout(Stdio::piped())
@@ -58,7 +58,7 @@ fn bytes(frames: &[TimedFrame]) -> Vec<u8> {
 }
 
 #[test]
-fn whoever_listens_to_a_recording_hears_the_bytes_of_the_robot() {
+fn a_played_recording_sends_the_bytes_of_the_robot() {
     let directory = tempfile::tempdir().unwrap();
     let [first, second] = ["first.mcap", "second.mcap"].map(|name| directory.path().join(name));
     let (_robot, line) = robot();
@@ -86,7 +86,7 @@ fn whoever_listens_to_a_recording_hears_the_bytes_of_the_robot() {
     printed(&["play", first.to_str().unwrap(), "--output", raw.to_str().unwrap(), "--fast"]);
     assert!(std::fs::read(raw).unwrap() == bytes(&frames_of_first));
     let again = toposlam(&["record", &line, first.to_str().unwrap()]).output().unwrap();
-    assert!(!again.status.success(), "a recording was overwritten, or a line found that is gone");
+    assert!(!again.status.success(), "record must not overwrite a file or accept a missing line");
     assert_eq!(frames(&first).0, frames_of_first);
 }
 
@@ -98,7 +98,7 @@ fn ctrl_c_finishes_a_recording_and_a_kill_leaves_it_readable() {
     for (signal, is_finished) in [("-INT", true), ("-KILL", false)] {
         let file = directory.path().join(format!("{signal}.mcap"));
         let mut record = toposlam(&["record", &line, file.to_str().unwrap()]).stdout(Stdio::piped()).spawn().unwrap();
-        // A chunk is written when it is full; the head alone is shorter than this.
+        // A chunk is written when it is complete; the file header alone is shorter than this.
         while !std::fs::metadata(&file).is_ok_and(|file| file.len() > 100_000) {
             std::thread::sleep(std::time::Duration::from_millis(20));
         }

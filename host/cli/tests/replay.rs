@@ -1,4 +1,4 @@
-//! `toposlam replay` on recordings of several laps of one round: a simulated one, and a real one where it is there.
+//! `toposlam replay` on recordings of several laps of a round: a simulated one, and a real one if it is present.
 
 use std::io::Write;
 use std::path::Path;
@@ -13,7 +13,7 @@ fn replayed(arguments: &[&str]) -> String {
     String::from_utf8(output.stdout).unwrap()
 }
 
-/// The numbers of the only line that begins and ends like this.
+/// The numbers in the only line with this beginning and end.
 fn numbers(text: &str, begins: &str, ends: &str) -> Vec<u32> {
     let fits = |line: &&str| line.trim().starts_with(begins) && line.ends_with(ends);
     let mut lines = text.lines().filter(fits);
@@ -21,7 +21,7 @@ fn numbers(text: &str, begins: &str, ends: &str) -> Vec<u32> {
     line.split(|character: char| !character.is_ascii_digit()).filter_map(|word| word.parse().ok()).collect()
 }
 
-/// Corridors around one block, each of another width, so that each of the four bends has another radius.
+/// Corridors of different widths around one block, so that each of the four bends has a different radius.
 fn round_plan() -> Plan {
     let mut text = String::from("cell_mm 250");
     for row in 0..36 {
@@ -35,19 +35,19 @@ fn round_plan() -> Plan {
     Plan::parse(&text).unwrap()
 }
 
-/// Laps of that round in centimetres, with a column for each sonar, and how many frames a lap takes.
+/// Laps of the round in centimetres, with a column for each sonar, and the number of frames per lap.
 fn laps_of_the_round(columns: &[String], laps: usize) -> (String, usize) {
     let model = RobotModel { u_turn_share: 0.0, ..RobotModel::default() };
     let simulation = Simulation::new(&round_plan(), model, 1).unwrap();
     assert_eq!(simulation.true_map().nodes.len(), 4);
     let mut rows = vec![columns.join(",")];
-    // The node that the robot came by first, and when.
+    // The first node that the robot passed, and when.
     let mut first = None;
     let mut lap_frames = usize::MAX;
     for (frame_index, (frame, truth)) in simulation.enumerate() {
         if let Some(node) = truth.node {
             let (first_node, first_index) = *first.get_or_insert((node, frame_index));
-            // It stays at a node while it turns there, for a second at most.
+            // The robot stays at a node while it turns, for at most one second.
             if node == first_node && frame_index > first_index + 20 && lap_frames == usize::MAX {
                 lap_frames = frame_index - first_index;
             }
@@ -88,7 +88,7 @@ fn laps_of_a_round_on_the_voronoi_graph_repeat_and_their_map_is_a_cycle() {
     let [_, on_graph, _] = numbers(&text, "the two nearest obstacles", "%")[..] else { panic!("{text}") };
     assert!(on_graph >= 95, "{text}");
 
-    // With a lap that is a fifth too long, most places are out of the tolerance.
+    // If a lap is a fifth too long, most places are outside the tolerance.
     let text = replayed(&[file, "--ring", ring, "--lap-frames", &(lap_frames * 6 / 5).to_string()]);
     let [_, again, expected, _] = numbers(&text, "in all", "same vertex")[..] else { panic!("{text}") };
     assert!(again * 2 < expected, "{text}");
@@ -96,10 +96,10 @@ fn laps_of_a_round_on_the_voronoi_graph_repeat_and_their_map_is_a_cycle() {
 }
 
 #[test]
-fn the_real_laps_along_the_walls_repeat_one_place_and_give_no_cycle() {
+fn real_laps_along_the_walls_repeat_one_place_and_give_no_cycle() {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared/data/scitos-g5/sensor_readings_24.data");
     if !path.exists() {
-        // Written past the capture of test output, so that it is seen.
+        // Bypasses the capture of test output, so that the message is visible.
         let _ = writeln!(std::io::stderr(), "SKIPPED: no recording at ../shared/data/scitos-g5");
         return;
     }
@@ -113,7 +113,8 @@ fn the_real_laps_along_the_walls_repeat_one_place_and_give_no_cycle() {
             panic!("{text}")
         };
         assert!((20..50).contains(&on_graph) && (1..10).contains(&at_meet_point), "{text}");
-        // One spot is in nearly every lap, and little else is; only the robust filter takes it for the same vertex: README says so.
+        // One place recurs in nearly every lap, and few others do; only the robust filter maps it to one vertex, as
+        // README states.
         let repeats = |line: &&str| line.contains(" come again in lap ") && !line.trim().starts_with("0 of ");
         let repeated = text.lines().filter(repeats);
         assert!(repeated.count() >= 4, "{text}");

@@ -1,7 +1,7 @@
-//! How fast a listener understands a robot here: an hour of a simulated robot's stream, on one core.
+//! Measures how fast a listener decodes one hour of a simulated robot's stream, on one core.
 //!
-//! `cargo run --release -p toposlam-link --example decode_rate`; with a FILE behind `--` it writes the stream there as well, for
-//! `python/examples/decode_rate.py` to measure the same in Python.
+//! `cargo run --release -p toposlam-link --example decode_rate`; with a FILE after `--` it also writes the stream
+//! there, so that `python/examples/decode_rate.py` can measure the same in Python.
 
 use std::time::Instant;
 
@@ -11,10 +11,10 @@ use toposlam_link::listener::Listener;
 use toposlam_sim::exploration::Exploration;
 use toposlam_sim::world::{Plan, RobotModel};
 
-/// An hour at ten ring frames a second.
+/// One hour at ten ring frames per second.
 const RING_FRAMES: u32 = 36_000;
 const RUNS: usize = 21;
-/// As a line delivers them at most.
+/// Largest piece that a line delivers.
 const PIECE_BYTES: usize = 4096;
 
 fn main() -> anyhow::Result<()> {
@@ -41,7 +41,7 @@ fn main() -> anyhow::Result<()> {
     Ok(())
 }
 
-/// What the robot of the office says in an hour.
+/// The stream of a robot in the office plan over one hour.
 fn an_hour() -> anyhow::Result<Vec<u8>> {
     let plan = Plan::built_in("office").context("the office is built in")?;
     let mut buffer = [0; SNAPSHOT_BYTES];

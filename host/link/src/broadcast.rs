@@ -1,4 +1,4 @@
-//! The robot's end of TCP lines: whoever connects hears what the robot says and may tell it what to do.
+//! The robot's end of TCP lines: every client receives the robot's stream and may send commands.
 
 use std::{
     collections::VecDeque,
@@ -6,10 +6,10 @@ use std::{
     net::{SocketAddr, TcpListener, TcpStream},
 };
 
-/// What a listener may be behind, in bytes; what is said beyond that is lost to it, as on a line that is too slow.
+/// Maximum backlog of a client, in bytes. Output beyond it is lost for that client, as on a line that is too slow.
 const BACKLOG_BYTES: usize = 1 << 16;
 
-/// A TCP port at which a robot speaks and is spoken to.
+/// A TCP port that serves a robot's stream and accepts commands.
 ///
 /// ```
 /// use std::io::Read;
@@ -39,35 +39,36 @@ struct Connection {
 }
 
 impl Broadcast {
-    /// Listens at an address, `HOST:PORT`; port 0 is any free one.
+    /// Listens at an address, `HOST:PORT`; port 0 selects any free port.
     ///
     /// # Errors
-    /// When the address is not this computer's, or taken.
+    /// If the address is not one of this computer, or is in use.
     pub fn bind(address: &str) -> io::Result<Self> {
         let port = TcpListener::bind(address)?;
         port.set_nonblocking(true)?;
         Ok(Self { port, listeners: Vec::new() })
     }
 
-    /// The address that it listens at.
+    /// The address of the listening socket.
     ///
     /// # Errors
-    /// When the system does not know it.
+    /// If the operating system does not report it.
     pub fn address(&self) -> io::Result<SocketAddr> {
         self.port.local_addr()
     }
 
-    /// How many are connected.
+    /// Number of connected clients.
     pub const fn listeners(&self) -> usize {
         self.listeners.len()
     }
 
-    /// How many bytes are still on their way to the slowest of them.
+    /// Largest backlog of any client, in bytes.
     pub fn unsent_bytes(&self) -> usize {
         self.listeners.iter().map(|listener| listener.unsent.len()).max().unwrap_or(0)
     }
 
-    /// Says something to all and gives what they said meanwhile. Never waits; who went away is forgotten.
+    /// Sends bytes to all clients and returns the bytes received from them. Never blocks; removes clients that have
+    /// disconnected.
     pub fn exchange(&mut self, said: &[u8]) -> Vec<u8> {
         while let Ok((stream, _)) = self.port.accept() {
             if stream.set_nonblocking(true).is_ok() && stream.set_nodelay(true).is_ok() {
@@ -110,7 +111,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn everyone_hears_the_robot_and_the_robot_hears_everyone() {
+    fn every_client_receives_the_stream_and_can_send() {
         let mut broadcast = Broadcast::bind("127.0.0.1:0").unwrap();
         let mut clients: Vec<TcpStream> =
             (0..2).map(|_| TcpStream::connect(broadcast.address().unwrap()).unwrap()).collect();

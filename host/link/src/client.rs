@@ -1,4 +1,4 @@
-//! A client of a robot: sends requests over its line until the replies come, and listens to everything else meanwhile.
+//! Client of a robot: sends a request until its reply arrives, and processes all other messages meanwhile.
 
 use std::{
     fmt,
@@ -14,10 +14,10 @@ use crate::listener::{Event, Listener};
 
 const BUFFER_BYTES: usize = 4096;
 
-/// A blocking client over any line. A read of the line should give up after some milliseconds when nothing comes.
+/// A blocking client over any line. Reads of the line should time out after some milliseconds.
 ///
-/// A request whose reply does not come in time is sent again, which the robot executes once.
-/// All that is heard goes to the callback, replies included.
+/// A request without a reply within the timeout is sent again; the robot executes it only once. The callback receives
+/// every event, replies included.
 ///
 /// ```no_run
 /// use toposlam::wire::Command;
@@ -36,15 +36,15 @@ pub struct Client<LINE, HEARD> {
     encoder: Encoder,
     listener: Listener,
     next_id: u16,
-    /// How long a reply, or the whole map, is waited for; 1 s unless set.
+    /// Timeout of a reply, or of the whole map; 1 s by default.
     pub timeout: Duration,
-    /// How often a request is sent before the client gives up; 5 unless set.
+    /// Number of times a request is sent before the client fails; 5 by default.
     pub attempts: u32,
 }
 
 impl<LINE: Read + Write, HEARD: FnMut(&Listener, Event<'_>)> Client<LINE, HEARD> {
-    /// A client on a line. `first_id` should not be the number of the last request of the client before it: a random one is
-    /// good.
+    /// A client on a line. `first_id` should differ from the last request id of the previous client; use a random
+    /// number.
     pub fn new(line: LINE, first_id: u16, heard: HEARD) -> Self {
         Self {
             line,
@@ -57,29 +57,29 @@ impl<LINE: Read + Write, HEARD: FnMut(&Listener, Event<'_>)> Client<LINE, HEARD>
         }
     }
 
-    /// What was heard so far.
+    /// The state of the robot so far.
     pub const fn listener(&self) -> &Listener {
         &self.listener
     }
 
-    /// Goes on over another line after the one before was cut; what was heard stays.
+    /// Continues on another line after the previous one failed; keeps the state.
     pub fn reconnect(&mut self, line: LINE) {
         self.line = line;
         self.listener.reconnected(&mut self.heard);
     }
 
-    /// Reads the line once and takes in what came, if anything.
+    /// Reads the line once and processes the received bytes, if any.
     ///
     /// # Errors
-    /// When the line fails or ends.
+    /// If the line fails or ends.
     pub fn listen(&mut self) -> Result<(), ClientError> {
         self.await_reply(None).map(drop)
     }
 
-    /// Sends a command and waits for what comes of it; a refusal is an outcome.
+    /// Sends a command and waits for its outcome. A refusal is an outcome, not an error.
     ///
     /// # Errors
-    /// [`ClientError::NoReply`] after the last attempt, [`ClientError::Line`] when the line fails.
+    /// [`ClientError::NoReply`] after the last attempt; [`ClientError::Line`] if the line fails.
     pub fn request(&mut self, command: Command) -> Result<Outcome, ClientError> {
         let request = Request { id: self.next_id, command };
         self.next_id = self.next_id.wrapping_add(1);
@@ -95,7 +95,7 @@ impl<LINE: Read + Write, HEARD: FnMut(&Listener, Event<'_>)> Client<LINE, HEARD>
         Err(ClientError::NoReply { attempts: self.attempts })
     }
 
-    /// Sends a command that has no answer but that it is done.
+    /// Sends a command whose only successful outcome is `Done`.
     ///
     /// # Errors
     /// As [`Client::request`], and [`ClientError::Refused`].
@@ -106,7 +106,7 @@ impl<LINE: Read + Write, HEARD: FnMut(&Listener, Event<'_>)> Client<LINE, HEARD>
         }
     }
 
-    /// Asks which robot this is and what it does.
+    /// Requests the robot's version, settings and state.
     ///
     /// # Errors
     /// As [`Client::order`].
@@ -117,10 +117,10 @@ impl<LINE: Read + Write, HEARD: FnMut(&Listener, Event<'_>)> Client<LINE, HEARD>
         }
     }
 
-    /// Asks for the whole map and waits until it is here.
+    /// Requests the whole map and waits until it is complete.
     ///
     /// # Errors
-    /// As [`Client::order`], and [`ClientError::NoMap`] when something of it was lost on the line each time.
+    /// As [`Client::order`], and [`ClientError::NoMap`] if part of the map is lost on the line in every attempt.
     pub fn map(&mut self) -> Result<&MapReplica<64>, ClientError> {
         for _ in 0..self.attempts {
             self.order(Command::GetMap)?;
@@ -136,7 +136,7 @@ impl<LINE: Read + Write, HEARD: FnMut(&Listener, Event<'_>)> Client<LINE, HEARD>
         Err(ClientError::NoMap)
     }
 
-    /// Has the robot take a snapshot and fetches it.
+    /// Requests a snapshot and fetches it.
     ///
     /// # Errors
     /// As [`Client::order`].
@@ -156,10 +156,10 @@ impl<LINE: Read + Write, HEARD: FnMut(&Listener, Event<'_>)> Client<LINE, HEARD>
         }
     }
 
-    /// Sends a snapshot and has the robot go on with its map.
+    /// Sends a snapshot; the robot replaces its map with it.
     ///
     /// # Errors
-    /// As [`Client::order`]; the robot then goes on as it was.
+    /// As [`Client::order`]; the robot then keeps its own map.
     pub fn restore(&mut self, snapshot: &[u8]) -> Result<(), ClientError> {
         let length = u16::try_from(snapshot.len()).map_err(|_| ClientError::Refused(Refusal::TooLong))?;
         self.order(Command::RestoreBegin { length, crc: crc32(snapshot) })?;
@@ -169,7 +169,7 @@ impl<LINE: Read + Write, HEARD: FnMut(&Listener, Event<'_>)> Client<LINE, HEARD>
         self.order(Command::RestoreCommit)
     }
 
-    /// Sends a zero before the frame, so that noise before it does not spoil it.
+    /// A zero byte before the frame terminates any preceding noise.
     fn send(&mut self, request: &Request) -> Result<(), ClientError> {
         let mut buffer = [0; MAX_FRAME_BYTES + 1];
         let (_, frame) = buffer.split_at_mut(1);
@@ -179,7 +179,7 @@ impl<LINE: Read + Write, HEARD: FnMut(&Listener, Event<'_>)> Client<LINE, HEARD>
         Ok(())
     }
 
-    /// Reads once and takes in what came; gives the outcome of the request with a number if that is among it.
+    /// Reads once and processes the received bytes; returns the outcome of request `id` if it has arrived.
     fn await_reply(&mut self, id: Option<u16>) -> Result<Option<Outcome>, ClientError> {
         let mut buffer = [0; BUFFER_BYTES];
         let count = match self.line.read(&mut buffer) {
@@ -206,21 +206,21 @@ fn is_pause(error: &io::Error) -> bool {
     matches!(error.kind(), io::ErrorKind::WouldBlock | io::ErrorKind::TimedOut | io::ErrorKind::Interrupted)
 }
 
-/// Why a robot did not do what it was told.
+/// Why a command failed.
 #[derive(Debug)]
 pub enum ClientError {
     /// The line failed.
     Line(io::Error),
-    /// No reply came.
+    /// No reply was received.
     NoReply {
-        /// How often the request was sent.
+        /// Number of times the request was sent.
         attempts: u32,
     },
-    /// The robot refused.
+    /// The robot refused the command.
     Refused(Refusal),
-    /// The robot answered something else than was asked for.
+    /// The reply does not match the request.
     OutOfPlace(Box<Outcome>),
-    /// The robot took the command, but its map did not arrive whole.
+    /// The robot accepted the command, but its map arrived incomplete.
     NoMap,
 }
 
@@ -230,7 +230,7 @@ impl From<io::Error> for ClientError {
     }
 }
 
-/// An outcome that is not the one that was asked for.
+/// The error for an outcome that does not match the request.
 impl From<Outcome> for ClientError {
     fn from(outcome: Outcome) -> Self {
         match outcome {

@@ -1,4 +1,4 @@
-//! What a robot says, in plain words: one line for each message.
+//! Messages of a robot as text, one line each.
 //!
 //! ```
 //! use toposlam::wire::Message;
@@ -18,10 +18,10 @@ use toposlam::wire::{
 
 use crate::listener::Event;
 
-/// The units of a logarithm on the wire that make one nat.
+/// Wire units of a logarithm per nat.
 const Q16: f64 = 65536.0;
 
-/// One event as a line: what was said, what is missing before it, or what was wrong with the bytes.
+/// One event as a line of text: the message, the number of frames lost before it, or the decoding error.
 pub fn event(event: Event<'_>) -> String {
     match event {
         Event::Damaged(error) => format!("damaged: {error}"),
@@ -34,7 +34,7 @@ pub fn event(event: Event<'_>) -> String {
     }
 }
 
-/// One message as a line.
+/// One message as a line of text.
 pub fn message(message: &Message) -> String {
     match message {
         Message::Hello(hello) => introduction(hello),
@@ -69,7 +69,7 @@ pub fn message(message: &Message) -> String {
     }
 }
 
-/// What came of a request.
+/// The outcome of a request.
 pub fn outcome(outcome: &Outcome) -> String {
     match outcome {
         Outcome::Done => "done".to_owned(),
@@ -82,7 +82,7 @@ pub fn outcome(outcome: &Outcome) -> String {
     }
 }
 
-/// Which robot this is and what it does, in a few lines.
+/// Version, settings and state of the robot, in a few lines.
 pub fn info(info: &Info) -> Vec<String> {
     let version = info.version;
     let mapping = if info.localise_only { "keeps the map and localises" } else { "maps" };
@@ -100,12 +100,12 @@ pub fn info(info: &Info) -> Vec<String> {
     lines
 }
 
-/// The name of a kind of fault by its number, or the number when it is not known here.
+/// Name of a kind of fault, or its number if it is unknown.
 pub fn fault_name(kind: u8) -> String {
     FaultKind::ALL.get(usize::from(kind)).map_or_else(|| format!("kind {kind}"), |kind| format!("{kind:?}"))
 }
 
-/// What the drive is doing, by its number.
+/// Description of the state of the drive, given its number.
 pub fn drive_state(state: u8) -> &'static str {
     const STATES: [(DriveState, &str); 7] = [
         (DriveState::FollowEdge, "follows an edge"),
@@ -119,17 +119,17 @@ pub fn drive_state(state: u8) -> &'static str {
     STATES.iter().find(|&&(known, _)| known as u8 == state).map_or("does something unknown here", |&(_, text)| text)
 }
 
-/// A distance in millimetres, of which the greatest number means that it is infinite.
+/// A distance in millimetres; the largest number means infinity.
 pub fn distance(distance_mm: u16) -> String {
     if distance_mm == u16::MAX { "infinite".to_owned() } else { format!("{distance_mm} mm") }
 }
 
-/// A logarithm of the wire in nats.
+/// A wire logarithm in nats.
 pub fn nats(ln_q16: i32) -> f64 {
     f64::from(ln_q16) / Q16
 }
 
-/// Seconds for a time of the wire.
+/// A wire time in seconds.
 pub fn seconds(time_ms: u32) -> f64 {
     f64::from(time_ms) / 1000.0
 }
@@ -257,7 +257,7 @@ mod tests {
     use toposlam::wire::{DecodeError, Header, List};
 
     #[test]
-    fn what_is_missing_or_damaged_is_said() {
+    fn lost_and_damaged_frames_are_reported() {
         let edge = Message::Edge { a: 0, b: 1, present: false };
         let header = Header { sequence: 1, arrival: Arrival::AfterGap { lost: 4 } };
         assert_eq!(event(Event::Message(header, &edge)), "no edge 0-1 any more (after 4 lost frames)");
@@ -271,7 +271,7 @@ mod tests {
     }
 
     #[test]
-    fn kinds_that_are_not_known_here_are_numbers() {
+    fn unknown_kinds_are_shown_as_numbers() {
         assert_eq!(message(&Message::Fault { kind: 14, count: 2 }), "fault DriveLost: 2 times");
         assert_eq!(message(&Message::Fault { kind: 200, count: 2 }), "fault kind 200: 2 times");
         assert_eq!(drive_state(DriveState::Approach as u8), "homes in on a place");

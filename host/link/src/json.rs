@@ -1,4 +1,4 @@
-//! Events as JSON, one object each, for scripts, browsers and brokers.
+//! Events as JSON objects, for scripts, browsers and brokers.
 //!
 //! ```
 //! use toposlam::wire::{Arrival, Header, Message};
@@ -15,8 +15,8 @@ use toposlam::wire::{Arrival, Echoes, Message};
 
 use crate::listener::Event;
 
-/// One event: `event` is the name of the message, or `Damaged`; the message's fields stand beside it under their names.
-/// `lost` is there when frames are missing before it.
+/// One event. `event` is the name of the message, or `Damaged`; the message's fields follow under their names. `lost`
+/// is present if frames are missing before the event.
 pub fn event(event: Event<'_>) -> Value {
     let (header, message) = match event {
         Event::Damaged(error) => return json!({"event": "Damaged", "error": error.to_string()}),
@@ -65,7 +65,7 @@ mod tests {
     use toposlam::wire::{Belief, DecodeError, Header, List, VertexProbability};
 
     #[test]
-    fn an_event_tells_what_was_lost_or_damaged() {
+    fn lost_and_damaged_frames_are_reported() {
         let header = Header { sequence: 9, arrival: Arrival::AfterGap { lost: 3 } };
         let echoes = Echoes::new(&[Echo::Dead, Echo::Silence, Echo::Range { range_mm: 5 }]);
         let ring = event(Event::Message(header, &Message::Ring { frame_index: 1, echoes }));
@@ -77,7 +77,7 @@ mod tests {
     }
 
     #[test]
-    fn lists_and_options_are_plain_json() {
+    fn lists_and_options_become_arrays_and_nulls() {
         let header = Header { sequence: 0, arrival: Arrival::InOrder };
         let vertices = List::new([VertexProbability { vertex: 2, permille: 900 }]);
         let belief =

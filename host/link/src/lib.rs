@@ -1,9 +1,10 @@
 //! The host's end of a robot's serial line.
 //!
-//! [`mod@line`] opens a line and [`broadcast`] is a robot's end of one. [`listener`] turns bytes into events, [`client`] sends requests,
-//! [`topology`] is the robot's map as plain data and [`layout`] where to draw it. [`export`] writes the map for other programs, and
-//! `recording` (feature `recording`) records everything. [`link`] keeps a line open from a thread of its own and [`watch`] the newest of what
-//! it brought. [`event_text`] and [`mod@json`] say an event in words and as JSON; [`mod@setting`] names the robot's settings.
+//! [`mod@line`] opens a line; [`broadcast`] is the robot's end of one. [`listener`] decodes bytes into events,
+//! [`client`] sends requests, [`topology`] holds the map as plain data, and [`layout`] computes positions for drawing
+//! it. [`export`] writes the map in other formats, and `recording` (feature `recording`) records the line. [`link`]
+//! keeps a line open in its own thread, and [`watch`] keeps the newest state of a link. [`event_text`] and [`mod@json`]
+//! format an event as text and as JSON; [`mod@setting`] names the robot's settings.
 
 pub mod broadcast;
 pub mod client;

@@ -1,4 +1,4 @@
-//! The line to a robot: a serial port of this computer, or a TCP connection to one elsewhere.
+//! The line to a robot: a local serial port or a TCP connection.
 
 use std::{
     io::{Read, Write},
@@ -8,7 +8,7 @@ use std::{
 
 use anyhow::Context;
 
-/// A read gives up after this long when nothing comes.
+/// Timeout of a read.
 const READ_TIMEOUT: Duration = Duration::from_millis(20);
 const WRITE_TIMEOUT: Duration = Duration::from_secs(5);
 
@@ -20,7 +20,7 @@ impl<LINE: Read + Write> Line for LINE {}
 /// Opens a line by its name: `tcp:HOST:PORT`, or a serial port with a speed in baud (8N1).
 ///
 /// # Errors
-/// When the port does not exist or cannot be opened, or nobody answers the connection.
+/// If the serial port does not exist or cannot be opened, or the TCP connection fails.
 pub fn open(name: &str, baud: u32) -> anyhow::Result<Box<dyn Line>> {
     if let Some(address) = name.strip_prefix("tcp:") {
         let line = TcpStream::connect(address).with_context(|| format!("connecting to {address}"))?;

@@ -1,5 +1,5 @@
-//! The line to a robot as a thread of its own: it opens the line, listens, tells the robot what it is told, and opens the
-//! line again when it is cut.
+//! The line to a robot in a thread of its own: opens the line, receives events, executes tasks, and reopens a failed
+//! line.
 //!
 //! ```
 //! use std::sync::mpsc::channel;
@@ -28,12 +28,12 @@ use crate::client::{Client, ClientError};
 use crate::line::{self, Line};
 use crate::listener::{Event, Listener};
 
-/// Where the bytes of a robot come from.
+/// Source of a robot's bytes.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Source {
-    /// A line that [`line::open`] opens: its name, and the speed of a serial port in baud.
+    /// A line opened by [`line::open`]: its name, and the speed of a serial port in baud.
     Line(String, u32),
-    /// The standard input: bytes as a robot sends them. Nothing can be told to it, and its end is the end.
+    /// The standard input: bytes as a robot sends them. Commands cannot be sent, and the link ends with the input.
     Input,
 }
 
@@ -50,23 +50,23 @@ impl Source {
         }
     }
 
-    /// A serial port that is opened again may reset its board, and a robot may well be silent: only TCP lines, which can be
-    /// dead without either end hearing of it.
+    /// Only a TCP connection can fail without notice to either end. Reopening a serial port may reset the board, and a
+    /// robot may be silent.
     fn can_die_silently(&self) -> bool {
         matches!(self, Self::Line(name, _) if name.starts_with("tcp:"))
     }
 }
 
-/// How patient a link is.
+/// Timeouts of a link.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Options {
-    /// How long to wait before a line that was cut, or is not there yet, is opened again.
+    /// Delay before a line that failed or does not exist is opened again.
     pub retry: Duration,
-    /// A TCP line on which nothing comes for so long is opened anew.
+    /// A TCP line that is silent for this long is reopened.
     pub silence: Duration,
-    /// How long a reply is waited for before a request is sent again.
+    /// Timeout of a reply; then the request is sent again.
     pub reply: Duration,
-    /// How often a request is sent.
+    /// Number of times a request is sent.
     pub attempts: u32,
 }
 
@@ -81,14 +81,14 @@ impl Default for Options {
     }
 }
 
-/// What to do with the robot.
+/// A task for the robot.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Task {
     /// Send one command.
     Tell(Command),
-    /// Take a snapshot and write it to a file; one that is there is replaced.
+    /// Fetch a snapshot and write it to a file, replacing an existing one.
     Snapshot(PathBuf),
-    /// Send the snapshot in a file and go on with its map.
+    /// Send the snapshot in a file; the robot replaces its map with it.
     Restore(PathBuf),
 }
 
@@ -112,25 +112,25 @@ impl fmt::Display for Task {
     }
 }
 
-/// What came of a task.
+/// The result of a task.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Answer {
-    /// The robot's own answer to a command, a refusal among them.
+    /// The robot's reply to a command; a refusal is a reply.
     Outcome(Outcome),
-    /// So many bytes of a snapshot were written to the file.
+    /// Number of bytes of the snapshot written to the file.
     Written(usize),
-    /// The robot goes on with a snapshot of so many bytes.
+    /// Number of bytes of the restored snapshot.
     Restored(usize),
 }
 
-/// Why a task was not done.
+/// Why a task failed.
 #[derive(Debug)]
 pub enum TaskError {
-    /// There is no line to the robot now.
+    /// The line to the robot is not open.
     NotConnected,
     /// The file cannot be read or written.
     File(io::Error),
-    /// The robot did not answer, or did not take the snapshot.
+    /// The robot did not reply, or refused the snapshot.
     Client(ClientError),
 }
 
@@ -158,23 +158,23 @@ impl From<io::Error> for TaskError {
     }
 }
 
-/// What happens on a link.
+/// An event of a link.
 #[derive(Debug)]
 pub enum News {
     /// The line is open.
     Connected,
-    /// The line was cut, or cannot be opened. It is tried again until it can, and this is not repeated for the same reason.
+    /// The line failed or cannot be opened. The link retries; a repeated failure for the same reason is not reported.
     Disconnected(String),
-    /// The standard input has ended, and nothing more will come.
+    /// The standard input has ended; no more news follows.
     Ended,
-    /// Something came of the bytes of the robot: `Ok` a message, `Err` a damage; and all that is known of the robot since then.
+    /// `Ok`: a message; `Err`: a decoding error. Each with the state of the robot after it.
     Heard(Result<(Header, Message), DecodeError>, Box<Listener>),
-    /// What came of a task.
+    /// The result of a task.
     Answered(Task, Result<Answer, TaskError>),
 }
 
 impl News {
-    /// An event of a listener, to be kept.
+    /// An owned copy of a listener's event.
     pub fn heard(listener: &Listener, event: Event<'_>) -> Self {
         let event = match event {
             Event::Message(header, message) => Ok((header, *message)),
@@ -184,28 +184,28 @@ impl News {
     }
 }
 
-/// The near end of a link. When it is dropped the link ends.
+/// Handle of a link. Dropping it ends the link.
 #[derive(Debug)]
 pub struct Link {
     tasks: Sender<Task>,
 }
 
 impl Link {
-    /// Starts a link. All that happens goes to `tell`, in the link's thread, until that says that nobody listens any more.
+    /// Starts a link. The link's thread calls `tell` with all news until it returns `false`.
     pub fn start(source: Source, options: Options, tell: impl FnMut(News) -> bool + Send + 'static) -> Self {
         let (sender, tasks) = channel();
         thread::spawn(move || Far { source, options, tasks, tell: Teller::new(tell) }.run());
         Self { tasks: sender }
     }
 
-    /// Has the link do something; [`News::Answered`] says what came of it. Tasks are done one after the other.
+    /// Queues a task; [`News::Answered`] has its result. Tasks run one after the other.
     pub fn start_task(&self, task: Task) {
-        // A link that has ended has said so.
+        // A link that has ended has already reported it.
         let _ = self.tasks.send(task);
     }
 }
 
-/// The far end, in its thread.
+/// The link's thread.
 struct Far<TELL> {
     source: Source,
     options: Options,
@@ -213,12 +213,12 @@ struct Far<TELL> {
     tell: Teller<TELL>,
 }
 
-/// Nobody listens any more.
+/// The receiver of the news is gone.
 struct Alone;
 
 impl<TELL: FnMut(News) -> bool> Far<TELL> {
     fn run(self) {
-        // Whoever ended it needs no more news.
+        // The owner that ended the link needs no more news.
         let _: Result<(), Alone> = self.connect_again_and_again();
     }
 
@@ -260,7 +260,7 @@ impl<TELL: FnMut(News) -> bool> Far<TELL> {
         client
     }
 
-    /// Listens and does tasks until the line is cut; says why it was.
+    /// Receives and executes tasks until the line fails; returns the reason.
     fn serve(&self, client: &mut Client<Box<dyn Line>, impl FnMut(&Listener, Event<'_>)>) -> Result<Cut, Alone> {
         self.tell.heard_at.set(Instant::now());
         loop {
@@ -291,7 +291,7 @@ impl<TELL: FnMut(News) -> bool> Far<TELL> {
         }
     }
 
-    /// Waits before the next attempt; what is to be told meanwhile cannot be.
+    /// Waits before the next attempt; tasks that arrive meanwhile fail.
     fn refuse_meanwhile(&self) -> Result<(), Alone> {
         let deadline = Instant::now() + self.options.retry;
         loop {
@@ -304,7 +304,7 @@ impl<TELL: FnMut(News) -> bool> Far<TELL> {
     }
 }
 
-/// Why a line is not used any more.
+/// Why a line is no longer used.
 enum Cut {
     Closed,
     Failed(String),
@@ -342,7 +342,7 @@ fn perform(
     })
 }
 
-/// Hands out news; the client's callback and the link share it.
+/// Sends news; shared by the client's callback and the link.
 struct Teller<TELL> {
     tell: RefCell<TELL>,
     listened_to: Cell<bool>,
@@ -363,7 +363,7 @@ impl<TELL: FnMut(News) -> bool> Teller<TELL> {
 
     fn hear(&self, news: News) {
         self.heard_at.set(Instant::now());
-        // The link looks after each read whether anyone listens.
+        // The link checks after each read whether the receiver still exists.
         let _ = self.say(news);
     }
 
@@ -372,7 +372,7 @@ impl<TELL: FnMut(News) -> bool> Teller<TELL> {
     }
 }
 
-/// A line that nothing can be said on.
+/// A line that cannot be written to.
 struct ReadOnly<READ>(READ);
 
 impl<READ: Read> Read for ReadOnly<READ> {

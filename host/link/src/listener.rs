@@ -1,4 +1,4 @@
-//! A listener to a robot: bytes in, events out, and the newest of everything at hand.
+//! Listener for the stream of a robot: decodes bytes into events and keeps the newest state.
 //!
 //! ```
 //! use toposlam::wire::{Encoder, MAX_FRAME_BYTES, Message};
@@ -22,12 +22,12 @@ use toposlam::wire::{
 
 use crate::topology::TopologicalMap;
 
-/// What came of the bytes that were fed.
+/// A decoded frame, or an error.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Event<'listener> {
-    /// A message, already taken in.
+    /// A message. The listener has already processed it.
     Message(Header, &'listener Message),
-    /// Bytes that were no message; they are counted, see [`Listener::counters`].
+    /// Bytes that are not a valid message; [`Listener::counters`] counts them.
     Damaged(DecodeError),
 }
 
@@ -40,7 +40,7 @@ impl<'a> From<&'a Result<(Header, Message), DecodeError>> for Event<'a> {
     }
 }
 
-/// All that is known of a robot from what it said. Memory: some 2 KiB, and nothing on the heap.
+/// State of a robot, decoded from its stream. Memory: about 2 KiB, no heap.
 #[derive(Clone, Debug)]
 pub struct Listener {
     decoder: Decoder,
@@ -48,7 +48,7 @@ pub struct Listener {
     latest: Latest,
 }
 
-/// The newest of what [`MapReplica`] does not keep.
+/// The newest values that [`MapReplica`] does not keep.
 #[derive(Clone, Copy, Debug, Default)]
 struct Latest {
     ring: Option<(u32, Echoes)>,
@@ -56,32 +56,32 @@ struct Latest {
     sighting: Option<Sighting>,
 }
 
-/// A place as the robot's detector saw it, before any inference.
+/// A place as detected by the robot, before inference.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Sighting {
-    /// The number of the place since the start, from 0.
+    /// Index of the place since the start, from 0.
     pub place_index: u32,
-    /// The ring frame in which the place was confirmed, from 0.
+    /// Index of the ring frame that confirmed the place, from 0.
     pub frame_index: u32,
-    /// The radius of the largest free disc around the place, in millimetres.
+    /// Radius of the largest free disc around the place, in millimetres.
     pub radius_mm: u16,
-    /// How many ways lead away from the place, when the detector could count them.
+    /// Number of exits of the place, if the detector could count them.
     pub degree: Option<u8>,
 }
 
-/// How well the robot is understood.
+/// Compatibility between the robot's protocol and this program's.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Understanding {
-    /// It has not introduced itself yet.
+    /// No `Hello` received yet.
     Unknown,
-    /// Both speak the same messages.
+    /// Same protocol version and schema.
     Whole,
-    /// The robot speaks another version; the messages that both know are understood.
+    /// The robot has another protocol version; messages known to both are decoded.
     Partly {
         /// The robot's [`PROTOCOL_VERSION`].
         theirs: u16,
     },
-    /// The robot means other things by the same messages: do not trust what is shown.
+    /// The robot's messages have another schema: the decoded values are not reliable.
     Not(HelloError),
 }
 
@@ -119,12 +119,12 @@ impl Default for Listener {
 }
 
 impl Listener {
-    /// A listener who has heard nothing.
+    /// A listener that has received nothing.
     pub fn new() -> Self {
         Self { decoder: Decoder::new(), replica: MapReplica::new(), latest: Latest::default() }
     }
 
-    /// Takes bytes as the line delivers them, in pieces of any length, and tells what they were, with itself as it is then.
+    /// Decodes bytes in pieces of any length. Calls back with each event and with the listener's state after it.
     pub fn feed(&mut self, bytes: &[u8], mut heard: impl FnMut(&Self, Event<'_>)) {
         let mut rest = bytes;
         loop {
@@ -160,12 +160,12 @@ impl Listener {
         }
     }
 
-    /// The line was opened anew: what was heard stays, a frame that was cut is given up.
+    /// Prepares for a reopened line: keeps the state and discards an incomplete frame.
     pub fn reconnected(&mut self, mut heard: impl FnMut(&Self, Event<'_>)) {
         self.feed(&[0], &mut heard);
     }
 
-    /// The map and the rest of what was heard.
+    /// The replica of the robot's map and state.
     pub const fn replica(&self) -> &MapReplica<64> {
         &self.replica
     }
@@ -175,27 +175,27 @@ impl Listener {
         TopologicalMap::from(&self.replica)
     }
 
-    /// How many messages came, and what was lost or damaged on the line.
+    /// Counts of received messages, and of frames lost or damaged on the line.
     pub const fn counters(&self) -> DecoderCounters {
         self.decoder.counters()
     }
 
-    /// How well the robot is understood.
+    /// Compatibility with the robot's protocol.
     pub fn understanding(&self) -> Understanding {
         Understanding::of(self.replica.hello())
     }
 
-    /// The newest ring frame: its number and what each sonar said.
+    /// The newest ring frame: its index and the echo of each sonar.
     pub fn ring(&self) -> Option<(u32, Echoes)> {
         self.latest.ring
     }
 
-    /// The last velocity command.
+    /// The newest velocity command.
     pub const fn velocity(&self) -> Option<Velocity> {
         self.latest.velocity
     }
 
-    /// The newest place, as its detector saw it.
+    /// The newest detected place.
     pub const fn sighting(&self) -> Option<Sighting> {
         self.latest.sighting
     }
@@ -214,7 +214,7 @@ mod tests {
     }
 
     #[test]
-    fn a_robot_of_another_version_is_named_with_both_versions() {
+    fn a_version_mismatch_reports_both_versions() {
         assert_eq!(Listener::new().understanding(), Understanding::Unknown);
         let capacities = Capacities {
             vertices: 16,
@@ -234,11 +234,11 @@ mod tests {
     }
 
     #[test]
-    fn damage_is_told_and_counted_and_the_next_message_heard() {
+    fn a_damaged_frame_is_counted_and_the_next_message_decoded() {
         let mut frame = [0; MAX_FRAME_BYTES];
         let mut encoder = Encoder::new(0);
         let mut bytes = encoder.encode(&Message::Edge { a: 0, b: 1, present: true }, &mut frame).unwrap().to_vec();
-        // Within the CRC, and no zero afterwards.
+        // A bit flip within the CRC that leaves no zero byte.
         let last = bytes.len() - 2;
         bytes[last] = if bytes[last] == 1 { 2 } else { 1 };
         bytes.extend_from_slice(

@@ -1,4 +1,4 @@
-//! The settings of a robot by name, as a person types them.
+//! Settings of a robot by name, as typed by a user.
 //!
 //! ```
 //! use toposlam::wire::Setting;
@@ -10,7 +10,7 @@
 
 use toposlam::wire::Setting;
 
-/// The name of every setting, in the order of their numbers on the wire.
+/// Name of each setting, in the order of the wire numbers.
 pub const NAMES: [&str; 9] = [
     "noise-mm",
     "hypotheses",
@@ -35,7 +35,7 @@ const MAKE: [fn(u16) -> Setting; NAMES.len()] = [
     Setting::SnapshotEveryPlaces,
 ];
 
-/// The setting of that name with a value; `None` when there is none. Whether the value is in its range, the robot says.
+/// The setting with a name and a value; `None` if the name is unknown. The robot checks the range of the value.
 pub fn named(name: &str, value: u16) -> Option<Setting> {
     NAMES.iter().zip(MAKE).find(|&(&known, _)| known == name).map(|(_, make)| make(value))
 }

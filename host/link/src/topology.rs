@@ -1,4 +1,4 @@
-//! A topological map as plain data, of whoever made it: a robot at the other end of a line, or the library on this computer.
+//! A topological map as plain data, from any source: a robot's stream or the library on this computer.
 //!
 //! ```
 //! use petgraph::algo::connected_components;
@@ -24,23 +24,23 @@ use toposlam::{Map, VertexId};
 /// The vertices of a map and the edges between them.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Hash)]
 pub struct TopologicalMap {
-    /// Vertex 0, 1, … with their labels.
+    /// Vertices 0, 1, … with their labels.
     pub vertices: Vec<Vertex>,
-    /// Every edge once, the smaller vertex first, in ascending order; equal ends are a self-loop.
+    /// Each edge once, smaller vertex first, in ascending order; equal ends are a self-loop.
     pub edges: Vec<(u8, u8)>,
 }
 
 /// One vertex, with its label.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub struct Vertex {
-    /// The mean radius observed there, in millimetres; 0 while it was not heard.
+    /// Mean observed radius, in millimetres; 0 until received.
     pub radius_mm: u16,
-    /// How many observations the mean is made of; 0 while that was not heard.
+    /// Number of observations in the mean; 0 until received.
     pub visits: u32,
 }
 
 impl TopologicalMap {
-    /// The same as a graph of `petgraph`, whose node `n` is vertex `n`.
+    /// Converts to a graph of `petgraph`, in which node `n` is vertex `n`.
     pub fn to_petgraph(&self) -> UnGraph<Vertex, ()> {
         let mut graph = UnGraph::with_capacity(self.vertices.len(), self.edges.len());
         let nodes: Vec<_> = self.vertices.iter().map(|vertex| graph.add_node(*vertex)).collect();
@@ -50,7 +50,7 @@ impl TopologicalMap {
         graph
     }
 
-    /// The number by which a robot names this map, see [`toposlam::wire::map_digest`].
+    /// Digest of this map, as the robot computes it; see [`toposlam::wire::map_digest`].
     pub fn digest(&self) -> u32 {
         let mut bytes = vec![self.vertices.len() as u8];
         for (label, neighbours) in self.vertices.iter().zip(self.neighbours()) {
@@ -62,7 +62,7 @@ impl TopologicalMap {
         crc32(&bytes)
     }
 
-    /// For every vertex its neighbours in ascending order; a vertex with a self-loop is its own neighbour.
+    /// Neighbours of each vertex in ascending order; a vertex with a self-loop is its own neighbour.
     pub fn neighbours(&self) -> Vec<Vec<usize>> {
         let mut neighbours = vec![Vec::new(); self.vertices.len()];
         for &(a, b) in &self.edges {
@@ -79,7 +79,7 @@ impl TopologicalMap {
     }
 }
 
-/// The map as heard so far.
+/// The map as received so far.
 impl<const V: usize> From<&MapReplica<V>> for TopologicalMap {
     fn from(replica: &MapReplica<V>) -> Self {
         let label = |vertex| {
@@ -105,7 +105,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_digest_is_the_one_that_a_robot_has_of_the_same_map() {
+    fn the_digest_equals_the_robots_digest_of_the_same_map() {
         let mut map: Map<8> = Map::new();
         let radius = |radius_mm| toposlam::Fingerprint::from_radius_mm(radius_mm).unwrap();
         let [a, b, c] = [1200, 400, 700].map(|radius_mm| map.add_vertex(radius(radius_mm)).unwrap());
@@ -116,7 +116,7 @@ mod tests {
     }
 
     #[test]
-    fn a_map_of_which_little_was_heard_has_the_vertices_of_its_edges() {
+    fn a_partially_received_map_includes_the_vertices_of_its_edges() {
         use toposlam::wire::{Arrival, Header, Message};
         let mut replica = MapReplica::<64>::new();
         replica.apply(Header { sequence: 0, arrival: Arrival::First }, &Message::Edge { a: 1, b: 3, present: true });

@@ -1,4 +1,4 @@
-//! What is known of the robot on a link, and where to draw its map: what every live view shows.
+//! State of the robot on a link and a layout of its map: the model of every live view.
 //!
 //! ```
 //! use toposlam::wire::{Encoder, MAX_FRAME_BYTES, Message};
@@ -18,20 +18,20 @@ use crate::link::News;
 use crate::listener::Listener;
 use crate::topology::TopologicalMap;
 
-/// Whether the line is open.
+/// State of the line.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Connection {
-    /// It is being opened for the first time.
+    /// Opening for the first time.
     Opening,
-    /// It is open.
+    /// Open.
     Open,
-    /// It is not, for this reason, and is tried again and again.
+    /// Closed for this reason; the link retries.
     Cut(String),
     /// The standard input has ended.
     Ended,
 }
 
-/// Takes in the news of a link, and keeps the picture of the map.
+/// Processes the news of a link, and keeps the layout of the map.
 #[derive(Clone, Debug)]
 pub struct Watch {
     line: String,
@@ -42,7 +42,7 @@ pub struct Watch {
 }
 
 impl Watch {
-    /// A watch of a line of that name that has heard nothing.
+    /// A watch of the named line that has received nothing.
     pub fn new(line: &str) -> Self {
         Self {
             line: line.to_owned(),
@@ -53,7 +53,7 @@ impl Watch {
         }
     }
 
-    /// Takes in what happened on the link.
+    /// Processes one event of the link.
     pub fn hear(&mut self, news: News) {
         match news {
             News::Connected => self.connection = Connection::Open,
@@ -69,28 +69,28 @@ impl Watch {
         }
     }
 
-    /// To be called before drawing: brings the map up to date, and gives each of its vertices a position.
+    /// Updates the map and gives each vertex a position. Call it before drawing.
     pub fn arrange(&mut self) {
         self.map = self.listener.map();
         self.layout.arrange(&self.map);
     }
 
-    /// The name of the line; `-` is the standard input.
+    /// Name of the line; `-` is the standard input.
     pub fn line(&self) -> &str {
         &self.line
     }
 
-    /// Whether the line is open.
+    /// State of the line.
     pub const fn connection(&self) -> &Connection {
         &self.connection
     }
 
-    /// All that was heard of the robot.
+    /// State of the robot.
     pub const fn listener(&self) -> &Listener {
         &self.listener
     }
 
-    /// The map as it was arranged last.
+    /// The map as of the last arrangement.
     pub const fn map(&self) -> &TopologicalMap {
         &self.map
     }

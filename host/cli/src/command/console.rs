@@ -1,4 +1,4 @@
-//! `toposlam command`: tell a robot on a serial line what to do.
+//! `toposlam command`: send a command to a robot over its line.
 
 use std::path::PathBuf;
 

@@ -1,4 +1,4 @@
-//! What `simulate` and `emulate` have in common: where the robot drives, and the summary of how that went.
+//! Options and summary shared by `simulate` and `emulate`.
 
 use std::ops::RangeInclusive;
 use std::path::PathBuf;
@@ -51,7 +51,7 @@ impl DriveArguments {
         Ok((load_plan(&self.plan)?, RobotModel::default().with_noise(self.noise)))
     }
 
-    /// The floor plan as it was given.
+    /// The floor plan argument.
     pub(super) fn plan(&self) -> &str {
         &self.plan
     }
@@ -61,7 +61,7 @@ impl DriveArguments {
         self.seed
     }
 
-    /// Prints the detected places and the scores of the map, and writes the picture if `--svg` was given.
+    /// Prints the detected places and the scores of the map, and writes the SVG file if `--svg` is given.
     pub(super) fn summarise<const V: usize>(&self, drive: &Summary<'_, V>) -> anyhow::Result<()> {
         let Summary { plan, truth, ground_truth, map, path, faults } = drive;
         let detections = ground_truth.detections();
@@ -99,7 +99,7 @@ pub(super) struct Summary<'a, const V: usize> {
 }
 
 impl<'a> Summary<'a, VERTICES> {
-    /// The summary of an exploration.
+    /// Summarises an exploration.
     pub(super) fn of(plan: &'a Plan, exploration: &'a Exploration<'_>) -> Self {
         Self {
             plan,
@@ -116,7 +116,7 @@ fn yes_or_no(answer: bool) -> &'static str {
     if answer { "yes" } else { "no" }
 }
 
-/// A built-in plan by its name, or one from a file.
+/// Loads a built-in plan by name, or one from a file.
 pub(super) fn load_plan(name_or_file: &str) -> anyhow::Result<Plan> {
     if let Some(plan) = Plan::built_in(name_or_file) {
         return Ok(plan);

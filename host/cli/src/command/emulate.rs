@@ -1,4 +1,4 @@
-//! `toposlam emulate`: the same exploration as `simulate`, mapped and driven by the firmware in an emulated STM32F405.
+//! `toposlam emulate`: the exploration of `simulate`, with mapping and drive in the firmware on an emulated STM32F405.
 
 use std::{
     ops::ControlFlow,
@@ -22,7 +22,7 @@ use super::drive::{DriveArguments, Summary, fault_rate};
 use super::hardship;
 use super::received::Received;
 
-/// Where `cargo firmware` puts the image.
+/// Path of the image built by `cargo firmware`.
 const IMAGE: &str = "thumbv7em-none-eabihf/firmware/robot";
 
 /// Arguments of `toposlam emulate`.
@@ -48,10 +48,10 @@ pub(crate) struct Arguments {
     faults: f64,
 }
 
-/// How long the world waits for the velocity command of the firmware.
+/// Timeout of the firmware's velocity command.
 const VELOCITY_TIMEOUT: Duration = Duration::from_secs(10);
 
-/// The same robot on this computer, and where it wanted to go after each frame.
+/// The same robot simulated on the host, and its velocity command after each frame.
 struct Repetition<'buffer> {
     exploration: Exploration<'buffer>,
     velocities: Vec<VelocityCommand>,
@@ -70,7 +70,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     }
     let (plan, model) = arguments.drive.world()?;
     let mut buffer = [0; SNAPSHOT_BYTES];
-    // The emulator asks for frames on one thread and hands on what it heard on another.
+    // The emulator requests frames on one thread and delivers messages on another.
     let repetition = Mutex::new(Repetition {
         exploration: Exploration::start(&plan, model, arguments.drive.seed(), &mut buffer)?,
         velocities: Vec::new(),
@@ -85,7 +85,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     let outcome = emulation.run(
         move || {
             if frames > 0 {
-                // The firmware has driven on by what it said after the last frame.
+                // The robot moves by the firmware's velocity command after the last frame.
                 let velocity = velocities.recv_timeout(VELOCITY_TIMEOUT).ok()?;
                 repeated.lock().ok()?.exploration.drive(velocity);
             }
@@ -112,7 +112,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
                     Message::Velocity(drive) => {
                         let speed_permille = drive.speed_permille.unsigned_abs();
                         let velocity = VelocityCommand { heading_mrad: drive.heading_mrad, speed_permille };
-                        // The world may have ended meanwhile.
+                        // The world may have ended already.
                         let _ = tell_velocity.send(velocity);
                         let expected = repetition.velocities.get(drive.frame_index as usize);
                         expected.is_none_or(|expected| *expected == velocity)
@@ -179,7 +179,7 @@ fn compare(exploration: &Exploration<'_>, heard: &Received) -> anyhow::Result<()
     Ok(())
 }
 
-/// Builds the firmware from the working directory and says where it is.
+/// Builds the firmware from the working directory and returns its path.
 fn build_firmware() -> anyhow::Result<PathBuf> {
     let cargo = std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into());
     let status = Command::new(cargo)

@@ -1,4 +1,4 @@
-//! `toposlam evaluate`: many random paths through known environments, and how often their maps are right.
+//! `toposlam evaluate`: the rate of exact maps over many random paths through known environments.
 
 use super::filter::FilterArgument;
 use anyhow::{Context, ensure};
@@ -182,7 +182,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     let evaluations =
         filters.iter().map(|&filter| arguments.course.settings(filter)).collect::<anyhow::Result<Vec<_>>>()?;
     let settings = &evaluations[0];
-    // Everything that can be wrong with the files is known before the first path is driven.
+    // All errors in the files are reported before the first path starts.
     let cases = arguments.cases.load()?;
     if let Some(directory) = &arguments.export {
         export(directory, &cases, settings).context("--export")?;
@@ -203,7 +203,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     Ok(())
 }
 
-/// Evaluates one filter in one case, with a bar on the standard error, and says there what a reader should know.
+/// Evaluates one filter in one case, with progress and warnings on the standard error.
 fn evaluate_with_progress(case: &Case, settings: &Settings) -> anyhow::Result<Vec<Row>> {
     let title = format!("{}, {} filter", case.name, settings.filter.name());
     let bar = Progress::new(title.clone(), settings.paths, "paths");
@@ -220,7 +220,7 @@ fn evaluate_with_progress(case: &Case, settings: &Settings) -> anyhow::Result<Ve
     Ok(rows)
 }
 
-/// Draws both filters side by side at the last check point.
+/// Plots both filters side by side at the last check point.
 fn plot(directory: &Path, cases: &[Case], rows: &[Row], length: usize) -> anyhow::Result<()> {
     let judged = |filter| rows.iter().filter(move |row| row.filter == filter && row.length == length);
     let pairs: Vec<Pair> = cases
@@ -286,7 +286,7 @@ impl CourseArguments {
 }
 
 impl FilterArguments {
-    /// The filter that was asked for, or both, ours first.
+    /// The selected filter, or both, the robust one first.
     fn chosen(&self, both: bool) -> anyhow::Result<Vec<Filter>> {
         let of_robust = [
             ("--noise-mm", self.noise_mm.is_some()),

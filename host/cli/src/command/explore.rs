@@ -1,5 +1,4 @@
-//! `toposlam explore`: how often a robot that drives itself has the exact map after an exploration, and how often it then reaches its
-//! goals, over many runs.
+//! `toposlam explore`: the rates of exact maps and of reached goals over many explorations of a simulated robot.
 
 use anyhow::ensure;
 use clap::Args;
@@ -14,7 +13,7 @@ use toposlam_sim::world::{Plan, Report, RobotModel};
 
 use super::drive::{fault_rate, load_plan, noise_factor, number_in};
 
-/// A goal_status that takes more ring frames is given up.
+/// Timeout of a goal, in ring frames.
 const FRAMES_PER_JOURNEY: u64 = 20_000;
 
 /// Arguments of `toposlam explore`.
@@ -136,12 +135,12 @@ fn travel(exploration: &mut Exploration<'_>, journeys: u64, seed: u64) -> Journe
     for number in 0..journeys {
         let vertices = exploration.robot().mapper().map().vertices().len() as u64;
         let here = exploration.steps().last().map(|step| u8::from(step.update.vertex));
-        // Any other vertex, by the seed.
+        // Any other vertex, chosen by the seed.
         let vertex = ((seed + 7 * number) % vertices.max(1)) as u8;
         if Some(vertex) == here {
             continue;
         }
-        // On an exact map the places of a vertex are those of one node.
+        // On an exact map all places of a vertex belong to the same node.
         let places = exploration.path().into_iter().zip(exploration.nodes().iter().copied());
         let truth = places.rev().find(|(taken_for, _)| *taken_for == Some(vertex.into())).and_then(|(_, node)| node);
         exploration.command(Command::GoTo { vertex });

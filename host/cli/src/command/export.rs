@@ -71,7 +71,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     }
 }
 
-/// What is heard from a source: its map.
+/// Reads the map of a source; returns the listener that holds it.
 fn listen(source: &str, baud: u32) -> anyhow::Result<Listener> {
     if source == "-" {
         return recorded(io::stdin().lock()).context("reading the standard input");
@@ -90,7 +90,7 @@ fn listen(source: &str, baud: u32) -> anyhow::Result<Listener> {
     Ok(client.listener().clone())
 }
 
-/// What is known at the end of the bytes that a robot sent.
+/// The state at the end of a robot's byte stream.
 fn recorded(mut bytes: impl Read) -> io::Result<Listener> {
     let mut listener = Listener::new();
     let mut buffer = [0; 1 << 16];
@@ -106,7 +106,7 @@ fn recorded(mut bytes: impl Read) -> io::Result<Listener> {
     Ok(listener)
 }
 
-/// What is known at the end of a recording.
+/// The state at the end of a recording.
 #[cfg(feature = "recording")]
 fn replayed(path: &Path) -> Result<Listener, RecordingError> {
     let mut listener = Listener::new();

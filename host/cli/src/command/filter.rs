@@ -1,4 +1,4 @@
-//! The choice of a filter on the command line.
+//! Command-line option for the filter.
 
 use clap::ValueEnum;
 use toposlam_eval::mapping::FilterChoice;

@@ -1,4 +1,4 @@
-//! `toposlam fleet`: listen to many robots at once, and say what that costs.
+//! `toposlam fleet`: monitor many robots in one thread, and measure the cost.
 
 use std::io::{BufRead, BufReader};
 use std::path::PathBuf;
@@ -15,7 +15,7 @@ use super::robots::pace;
 
 /// Interval of the printed figures.
 const REPORT: Duration = Duration::from_secs(1);
-/// How long robots are waited for before what is heard is told.
+/// Maximum wait for connections before the first report.
 const CONNECTING: Duration = Duration::from_secs(5);
 
 /// Arguments of `toposlam fleet`.
@@ -93,7 +93,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     Ok(())
 }
 
-/// What was heard up to a moment, and what it took.
+/// Totals and computing time at a moment.
 #[derive(Clone, Copy)]
 struct Sample {
     at: Instant,
@@ -106,7 +106,7 @@ impl Sample {
         Self { at, computing: computing_time(), totals: fleet.totals() }
     }
 
-    /// The state, and the rates since an earlier sample.
+    /// Formats the state, and the rates since an earlier sample.
     fn since(&self, earlier: &Self) -> String {
         let (now, then) = (&self.totals, &earlier.totals);
         let seconds = (self.at - earlier.at).as_secs_f64();
@@ -132,11 +132,11 @@ impl Sample {
     }
 }
 
-/// The process in which recorded robots speak; it ends with this one.
+/// The child process that serves recorded robots; it ends with this one.
 struct Crowd(Child);
 
 impl Crowd {
-    /// Starts it, and gives the address at which its robots are.
+    /// Starts the process, and returns the address of its robots.
     fn start(count: u32, speed: f64) -> anyhow::Result<(Self, String)> {
         let mut crowd = Command::new(std::env::current_exe()?)
             .args(["robots", "--listen", "127.0.0.1:0"])
@@ -156,13 +156,13 @@ impl Crowd {
 
 impl Drop for Crowd {
     fn drop(&mut self) {
-        // It may have ended already.
+        // The process may have ended already.
         let _ = self.0.kill();
         let _ = self.0.wait();
     }
 }
 
-/// The name and the address of each robot.
+/// Parses the name and the address of each robot.
 fn lines_of(text: &str) -> anyhow::Result<Vec<(String, String)>> {
     let mut lines = Vec::new();
     for line in text.lines().map(str::trim).filter(|line| !line.is_empty() && !line.starts_with('#')) {
@@ -179,7 +179,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_file_names_robots_and_where_they_are() {
+    fn a_file_lists_names_and_addresses() {
         let lines = lines_of("# hall\ntcp:10.0.0.1:7070 first robot\n\n  tcp:localhost:7071\n").unwrap();
         let expected = [("first robot", "10.0.0.1:7070"), ("tcp:localhost:7071", "localhost:7071")];
         assert_eq!(lines, expected.map(|(name, address)| (name.to_owned(), address.to_owned())));

@@ -1,7 +1,7 @@
-//! `toposlam emulate --faults`: the firmware in the emulator maps in spite of faults on the way to its sensors and on its line.
+//! `toposlam emulate --faults`: the emulated firmware maps with injected faults on its sensor bus and its line.
 //!
-//! What the firmware hears then depends on the moment at which each byte arrives, so a repetition on this computer would hear
-//! something else. Instead the firmware's map is fetched as a snapshot and held to the truth.
+//! With faults, the firmware's input depends on the arrival time of each byte, so the host simulation cannot reproduce
+//! it. Instead, the firmware's map is fetched as a snapshot and compared with the ground truth.
 
 use std::{
     ops::ControlFlow,
@@ -25,17 +25,17 @@ use toposlam_sim::injector::{FaultRates, LineInjector};
 use super::drive::{DriveArguments, Summary};
 use super::received::Received;
 
-/// The world stands still for so long when the firmware does not say where it drives: a fault may have begun a frame for the
-/// sensors that is none for the firmware.
+/// Maximum wait for a velocity command; then the world repeats its frame. A fault can start a frame on the sensor bus
+/// that the firmware does not receive.
 const PATIENCE: Duration = Duration::from_millis(300);
-/// The exploration ends after so many frames for each place that is wanted.
+/// Maximum number of frames per requested place.
 const FRAMES_PER_PLACE: u32 = 1000;
-/// After the world's last frame, so many without any sensor are enough for the snapshot.
+/// Frames without any sensor after the world's last one, enough for the transfer of the snapshot.
 const BLIND_FRAMES: u64 = 5000;
-/// A request that was not answered within so many turns of the firmware's loop is sent again.
+/// Loop iterations of the firmware without a reply after which a request is sent again.
 const PATIENCE_TURNS: u32 = 4;
 
-/// The world and the truth.
+/// The world and the ground truth.
 struct Trial<'buffer> {
     exploration: Exploration<'buffer>,
     frames: u32,
@@ -49,7 +49,7 @@ impl Trial<'_> {
     }
 }
 
-/// Drives the emulated firmware until it has found so many places.
+/// Drives the emulated firmware until it has detected `places` places.
 pub(super) fn run(
     arguments: &DriveArguments,
     mut emulation: Emulation,
@@ -59,7 +59,7 @@ pub(super) fn run(
     let (plan, model) = arguments.world()?;
     let mut buffer = [0; SNAPSHOT_BYTES];
     let exploration = Exploration::start(&plan, model, arguments.seed(), &mut buffer)?;
-    // The emulator asks for frames on one thread and hands on what it heard on another.
+    // The emulator requests frames on one thread and delivers messages on another.
     let trial = Mutex::new(Trial { exploration, frames: 0, is_over: false });
     let (tell_velocity, velocities) = mpsc::channel::<VelocityCommand>();
     let bar = Progress::new("", places, "places");
@@ -79,7 +79,7 @@ pub(super) fn run(
                 let Ok(velocity) = velocities.recv_timeout(PATIENCE) else { return last };
                 let mut trial = world.lock().ok()?;
                 trial.exploration.drive(velocity);
-                // Frames of the firmware in which no sensor heard its start.
+                // Firmware frames whose start no sensor received.
                 while let Ok(velocity) = velocities.try_recv() {
                     trial.frame();
                     trial.exploration.drive(velocity);
@@ -98,7 +98,7 @@ pub(super) fn run(
                         let Ok(fingerprint) = Fingerprint::from_radius_mm(radius_mm) else {
                             return ControlFlow::Break(());
                         };
-                        // The firmware may have taken more or fewer frames than the world has given.
+                        // The frame counts of the firmware and of the world may differ.
                         let ago = turns.saturating_sub(frame_index);
                         let frame_index = trial.frames.saturating_sub(ago + 1);
                         trial.exploration.note(&Place { fingerprint, frame_index, degree, spread_mm: 0 });
@@ -107,7 +107,7 @@ pub(super) fn run(
                     Message::Velocity(drive) => {
                         turns = drive.frame_index.wrapping_add(1);
                         let speed_permille = drive.speed_permille.unsigned_abs();
-                        // The world may have ended meanwhile.
+                        // The world may have ended already.
                         let _ =
                             tell_velocity.send(VelocityCommand { heading_mrad: drive.heading_mrad, speed_permille });
                         if trial.is_over {
@@ -155,7 +155,7 @@ pub(super) fn run(
     Ok(())
 }
 
-/// Fetches a snapshot over the line, a piece in each turn of the firmware's loop.
+/// Fetches a snapshot over the line, one chunk per iteration of the firmware's loop.
 struct Fetch {
     encoder: Encoder,
     id: u16,
@@ -179,7 +179,7 @@ impl Fetch {
         }
         let command = Command::GetSnapshot { offset: self.snapshot.len() as u16 };
         let mut frame = [0; MAX_FRAME_BYTES];
-        // A buffer of that size is always enough. The zero before it ends what noise has begun.
+        // A buffer of this size is always sufficient. The leading zero byte terminates any noise.
         let frame = self.encoder.encode(&Request { id: self.id, command }, &mut frame).unwrap_or(&[]);
         to_firmware.push(0);
         to_firmware.extend_from_slice(frame);

@@ -1,4 +1,4 @@
-//! Ctrl-C as a flag, for commands that have something to finish.
+//! Ctrl-C as a flag, for commands that must finish cleanly.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -6,11 +6,11 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use signal_hook::consts::{SIGINT, SIGTERM};
 use signal_hook::flag;
 
-/// Whether the program was told to end.
+/// Whether Ctrl-C was pressed.
 pub(super) struct Interrupt(Arc<AtomicBool>);
 
 impl Interrupt {
-    /// Watches from here on. A second Ctrl-C ends the program at once.
+    /// Handles Ctrl-C from now on. A second Ctrl-C ends the program at once.
     pub(super) fn watch() -> std::io::Result<Self> {
         let told = Arc::new(AtomicBool::new(false));
         for signal in [SIGINT, SIGTERM] {

@@ -1,4 +1,4 @@
-//! Stand-ins for the commands that this build leaves out: each fails and names the feature that it needs.
+//! Stand-ins for commands that this build omits: each fails and names the required feature.
 
 macro_rules! missing {
     ($command:ident, $feature:literal) => {

@@ -1,5 +1,5 @@
-//! The subcommands, a file each: its arguments and what it does with them. `drive` has the options that `simulate` and
-//! `emulate` share, `filter` the choice of a filter, `hardship` the emulation with faults, `interrupt` Ctrl-C.
+//! The subcommands, one file each, with arguments and implementation. `drive` has the options shared by `simulate` and
+//! `emulate`, `filter` the choice of a filter, `hardship` the emulation with faults, `interrupt` Ctrl-C.
 
 pub(crate) mod console;
 mod drive;

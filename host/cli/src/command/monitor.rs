@@ -1,4 +1,4 @@
-//! `toposlam monitor`: watch a robot live in this terminal, and tell it what to do.
+//! `toposlam monitor`: monitor and command a robot in the terminal.
 
 use std::io::stdout;
 use std::ops::ControlFlow;

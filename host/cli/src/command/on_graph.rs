@@ -1,4 +1,5 @@
-//! `toposlam simulate --on-graph`: the robot follows the true Voronoi graph, which tests detector and filters without the drive.
+//! `toposlam simulate --on-graph`: the robot follows the true Voronoi graph, to test detector and filters without the
+//! drive.
 
 use clap::{Args, ValueEnum};
 use toposlam_cli::progress::Progress;

@@ -15,9 +15,9 @@ use super::console::print_map;
 use super::interrupt::Interrupt;
 use super::robot::speed;
 
-/// Whoever connects, and whoever listens, is served so often at least.
+/// Interval of the accept and send loop.
 const TURN: Duration = Duration::from_millis(10);
-/// How long the last bytes may take to whoever listens.
+/// Timeout for sending the last bytes to clients.
 const FAREWELL: Duration = Duration::from_secs(5);
 
 /// Arguments of `toposlam play`.
@@ -39,7 +39,7 @@ pub(crate) struct Arguments {
     fast: bool,
 }
 
-/// Where the bytes of the line go.
+/// Destination of the recorded bytes.
 enum Output {
     Nowhere,
     Bytes(Box<dyn Write>),
@@ -73,7 +73,7 @@ impl Output {
         }
     }
 
-    /// Lets whoever listens have the last bytes.
+    /// Waits until the last bytes are sent.
     fn finish(&mut self) -> std::io::Result<()> {
         match self {
             Self::Nowhere => Ok(()),

@@ -1,4 +1,4 @@
-//! `toposlam publish`: tell an MQTT broker all that a robot says.
+//! `toposlam publish`: publish a robot's messages to an MQTT broker.
 
 use std::sync::mpsc::channel;
 use std::sync::{Arc, Mutex, PoisonError};
@@ -10,7 +10,7 @@ use toposlam_link::link::{Link, News, Options as LinkOptions, Source};
 
 use super::interrupt::Interrupt;
 
-/// How soon the end is noticed.
+/// Polling interval of the end conditions.
 const TURN: Duration = Duration::from_millis(50);
 
 /// Arguments of `toposlam publish`.
@@ -56,14 +56,14 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
         let mut publisher = teller.lock().unwrap_or_else(PoisonError::into_inner);
         let Some(publisher) = publisher.as_mut() else { return false };
         publisher.hear(&news);
-        // It matters only to one who still waits.
+        // The result matters only while the main thread waits.
         !matches!(news, News::Ended) || sender.send(()).is_ok()
     });
     let end = arguments.seconds.map(|seconds| Instant::now() + Duration::from_secs(seconds));
     let is_over = || interrupt.is_told() || end.is_some_and(|end| Instant::now() >= end);
     while !is_over() && ended.recv_timeout(TURN).is_err() {}
     drop(link);
-    // Dropping it here and not in the link's thread lets it say its last words.
+    // Dropped here and not in the link's thread, so that its last messages are sent.
     let Some(publisher) = publisher.lock().unwrap_or_else(PoisonError::into_inner).take() else { return Ok(()) };
     let counters = publisher.counters();
     drop(publisher);

@@ -1,4 +1,4 @@
-//! The messages that the emulated firmware sent.
+//! Messages received from the emulated firmware.
 
 use std::ops::ControlFlow;
 
@@ -16,7 +16,7 @@ impl Received {
         Self { decoder: Decoder::new(), replica: MapReplica::new(), places: Vec::new() }
     }
 
-    /// Decodes bytes of the line, and passes every message on.
+    /// Decodes bytes of the line, and passes every message to the callback.
     pub(super) fn feed(
         &mut self,
         bytes: &[u8],

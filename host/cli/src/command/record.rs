@@ -36,7 +36,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     let file = &arguments.file;
     let mut recorder = Recorder::create(file).with_context(|| format!("creating {}", file.display()))?;
     let interrupt = Interrupt::watch()?;
-    // The clock of the computer may be set meanwhile; the times of the recording go on evenly.
+    // A monotonic clock: the system clock may be adjusted during the recording.
     let start = Instant::now();
     let start_time = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default();
     let end = arguments.seconds.map(Duration::from_secs);
@@ -68,7 +68,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     }
 }
 
-/// What came, if anything; the end of the line is an error.
+/// The received bytes, if any; the end of the line is an error.
 fn read<'buffer>(line: &mut Box<dyn Line>, buffer: &'buffer mut [u8]) -> std::io::Result<&'buffer [u8]> {
     match line.read(buffer) {
         Ok(0) => Err(ErrorKind::UnexpectedEof.into()),

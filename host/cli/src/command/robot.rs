@@ -1,4 +1,4 @@
-//! `toposlam robot`: a simulated robot at the other end of a TCP line, for whoever has no robot at hand.
+//! `toposlam robot`: a simulated robot that serves its line at a TCP port, for use without hardware.
 
 use std::time::{Duration, Instant};
 
@@ -11,7 +11,7 @@ use toposlam_sim::world::RobotModel;
 
 use super::drive::{load_plan, noise_factor};
 
-/// Ring frames in a second of the robot's time.
+/// Ring frames per second of robot time.
 const FRAMES_PER_SECOND: f64 = 10.0;
 
 /// Arguments of `toposlam robot`.
@@ -37,7 +37,7 @@ pub(crate) struct Arguments {
     places: usize,
 }
 
-/// A pace, 1 being that of a clock.
+/// Parses a speed; 1 is real time.
 pub(super) fn speed(text: &str) -> Result<f64, String> {
     let speed = text.parse().map_err(|error| format!("{error}"))?;
     if (0.01..=1000.0).contains(&speed) { Ok(speed) } else { Err("must be 0.01 to 1000".to_owned()) }

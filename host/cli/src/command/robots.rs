@@ -1,4 +1,4 @@
-//! `toposlam robots`: many recorded robots at one TCP port, for `toposlam fleet --simulate`.
+//! `toposlam robots`: serve many recorded robots at one TCP port, for `toposlam fleet --simulate`.
 
 use std::time::{Duration, Instant};
 
@@ -9,9 +9,9 @@ use toposlam_cli::fleet::crowd::{Afterwards, Crowd, Life, Pace};
 
 use super::drive::load_plan;
 
-/// The lives, each a plan and the seed of its drive.
+/// The recordings, each a plan and the seed of its drive.
 const LIVES: [(&str, u64); 2] = [("office", 1), ("ring", 2)];
-/// How often robots live on. It is shorter than a ring frame, so that they do not all speak at once.
+/// Interval of the send loop, shorter than a ring frame, so that the robots do not all send at once.
 const TURN: Duration = Duration::from_millis(5);
 
 /// Arguments of `toposlam robots`.
@@ -31,7 +31,7 @@ pub(crate) struct Arguments {
     frames: u32,
 }
 
-/// A pace, 1 being that of a clock and 0 as fast as possible.
+/// Parses a speed; 1 is real time and 0 unlimited.
 pub(super) fn pace(text: &str) -> Result<f64, String> {
     if text == "0" { Ok(0.0) } else { super::robot::speed(text) }
 }

@@ -1,4 +1,4 @@
-//! `toposlam simulate`: a simulated robot explores a floor plan by its own drive.
+//! `toposlam simulate`: a simulated robot explores a floor plan with its own drive.
 
 use std::path::PathBuf;
 
@@ -63,7 +63,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     Ok(())
 }
 
-/// The map now, each vertex at the true node that it was mostly visited at.
+/// The current map, with each vertex at the true node of the majority of its visits.
 fn map_now(plan: &str, exploration: &Exploration<'_>, driven: usize) -> Step {
     let truth = exploration.rover().true_map();
     let detections: Vec<Detection> = exploration

@@ -1,4 +1,4 @@
-//! `toposlam soak`: hours of a robot's life, with faults and an operator, in little time.
+//! `toposlam soak`: simulate a robot for hours with injected faults and an operator.
 
 use anyhow::ensure;
 use clap::Args;

@@ -1,14 +1,14 @@
-//! What this process has used of the computer, and what it may use.
+//! Resources of this process: use and limits.
 
 use std::io;
 use std::net::{TcpListener, TcpStream};
 use std::time::Duration;
 
-/// What the system may hold for a line that is not read yet: some ten seconds of a robot at its normal pace.
+/// Receive buffer of the operating system per line: about ten seconds of a robot at its normal pace.
 #[cfg(unix)]
 const RECEIVE_BUFFER_BYTES: usize = 1 << 15;
 
-/// The time that all threads of this process have computed, in it or for it in the system; `None` where it is not known.
+/// CPU time of all threads of this process, user and system; `None` if it is not available.
 pub fn computing_time() -> Option<Duration> {
     #[cfg(unix)]
     {
@@ -19,18 +19,18 @@ pub fn computing_time() -> Option<Duration> {
     None
 }
 
-/// The memory of this process that is in use now, in bytes; `None` where it is not known (it is on Linux). What the system
-/// holds for open connections is not in it.
+/// Resident memory of this process, in bytes; `None` if it is not available (it is on Linux). Excludes the operating
+/// system's buffers for open connections.
 pub fn resident_bytes() -> Option<u64> {
     let status = std::fs::read_to_string("/proc/self/status").ok()?;
     let kibibytes = status.lines().find_map(|line| line.strip_prefix("VmRSS:"))?.trim().strip_suffix(" kB")?;
     Some(kibibytes.trim().parse::<u64>().ok()? * 1024)
 }
 
-/// Lets this process open as many connections as the system allows it; by itself it may often open 1,024 only.
+/// Raises this process's limit of open connections to the system's maximum; the default is often 1,024.
 ///
 /// # Errors
-/// When the system does not let it.
+/// If the operating system refuses.
 pub fn allow_many_connections() -> io::Result<()> {
     #[cfg(unix)]
     {
@@ -41,8 +41,8 @@ pub fn allow_many_connections() -> io::Result<()> {
     Ok(())
 }
 
-/// Lets that many connect before the first of them is accepted. The system may drop what is beyond, and with the usual 128 some of a
-/// thousand believe that they are connected and hear nothing.
+/// Sets the number of connections that may wait to be accepted. The system may drop any beyond it: with the usual 128,
+/// some of a thousand clients appear connected but receive nothing.
 pub(super) fn expect_many(port: &TcpListener, count: usize) -> io::Result<()> {
     #[cfg(unix)]
     rustix::net::listen(port, i32::try_from(count).unwrap_or(i32::MAX))?;
@@ -51,7 +51,7 @@ pub(super) fn expect_many(port: &TcpListener, count: usize) -> io::Result<()> {
     Ok(())
 }
 
-/// Bounds what the system holds for a line that is not read; a thousand that grow as they like can take all of its memory.
+/// Limits the receive buffer of a line; a thousand unlimited buffers can use all memory of the system.
 pub(super) fn bound_receiving(stream: &mio::net::TcpStream) -> io::Result<()> {
     #[cfg(unix)]
     rustix::net::sockopt::set_socket_recv_buffer_size(stream, RECEIVE_BUFFER_BYTES)?;
@@ -60,7 +60,7 @@ pub(super) fn bound_receiving(stream: &mio::net::TcpStream) -> io::Result<()> {
     Ok(())
 }
 
-/// The same for what was said and did not leave yet.
+/// Limits the send buffer of a line.
 pub(super) fn bound_sending(stream: &TcpStream) -> io::Result<()> {
     #[cfg(unix)]
     rustix::net::sockopt::set_socket_send_buffer_size(stream, RECEIVE_BUFFER_BYTES)?;

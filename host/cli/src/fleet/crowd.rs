@@ -1,6 +1,6 @@
-//! Many robots at one TCP port, for trying and measuring a listener: each connection is one of them.
+//! Many robots at one TCP port, for testing and measuring a fleet: each connection is one robot.
 //!
-//! They are robots that lived before and say all of it again. A thousand that live would cost more than listening to them.
+//! The robots replay recorded streams. A thousand simulated robots would cost more than monitoring them.
 
 use std::io::{self, ErrorKind, Write};
 use std::net::{SocketAddr, TcpListener, TcpStream};
@@ -14,28 +14,28 @@ use toposlam_link::topology::TopologicalMap;
 use toposlam_sim::exploration::Exploration;
 use toposlam_sim::world::{Plan, RobotModel, VoronoiError};
 
-/// How long a ring frame lasts at a robot's normal pace.
+/// Duration of a ring frame at a robot's normal pace.
 const FRAME_TIME: Duration = Duration::from_millis(100);
-/// What one robot says before the next one does, when all are as fast as they can.
+/// Maximum number of bytes that a robot sends in one turn at unlimited pace.
 const PIECE_BYTES: usize = 1 << 12;
-/// A robot that starts anew after that many messages is understood as one that did; after more it would look like one of
-/// which frames were lost.
+/// A restart after this many messages is recognised as one; after more messages it would look like lost frames.
 const MOST_MESSAGES: u32 = 30_000;
 
-/// All that a simulated robot said.
+/// The recorded stream of a simulated robot.
 #[derive(Clone, Debug)]
 pub struct Life {
     bytes: Vec<u8>,
-    /// How many of the bytes were said by the end of each ring frame.
+    /// Number of bytes sent by the end of each ring frame.
     ends: Vec<usize>,
     map: TopologicalMap,
 }
 
 impl Life {
-    /// Lets a robot explore a plan for so many ring frames, fewer when it says more than the line's numbers can tell apart.
+    /// Records a robot that explores a plan for a number of ring frames, or fewer if its stream exceeds the range of
+    /// sequence numbers.
     ///
     /// # Errors
-    /// When the plan has no true map.
+    /// If the plan has no true map.
     pub fn record(plan: &Plan, seed: u64, frames: usize) -> Result<Self, VoronoiError> {
         let mut buffer = [0; SNAPSHOT_BYTES];
         let mut exploration = Exploration::start(plan, RobotModel::default(), seed, &mut buffer)?;
@@ -50,17 +50,17 @@ impl Life {
         Ok(Self { bytes, ends, map })
     }
 
-    /// How many ring frames it lasts.
+    /// Number of ring frames.
     pub const fn frames(&self) -> usize {
         self.ends.len()
     }
 
-    /// How many bytes the robot said.
+    /// Number of bytes of the stream.
     pub const fn bytes(&self) -> usize {
         self.bytes.len()
     }
 
-    /// The robot's map at the end.
+    /// The robot's final map.
     pub const fn map(&self) -> &TopologicalMap {
         &self.map
     }
@@ -81,21 +81,21 @@ fn messages_in(bytes: &[u8]) -> u32 {
     }
 }
 
-/// What becomes of a robot that has said all.
+/// Behaviour of a robot at the end of its recording.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Afterwards {
-    /// It starts anew, with an empty map, as after a reset.
+    /// Restarts with an empty map, as after a reset.
     Again,
-    /// It says nothing more, and the line stays open.
+    /// Stops sending, and keeps the line open.
     Silence,
 }
 
-/// How fast the robots live.
+/// Speed of the replay.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Pace {
-    /// So many times as fast as a real one.
+    /// A multiple of real time.
     Times(f64),
-    /// As fast as they are listened to.
+    /// As fast as the bytes are read.
     Unbounded,
 }
 
@@ -108,53 +108,53 @@ pub struct Crowd {
     speakers: Vec<Option<Speaker>>,
 }
 
-/// A robot that someone listens to.
+/// A connected robot.
 struct Speaker {
     stream: TcpStream,
     life: usize,
-    /// Since when it lives, in ring frames of this life.
+    /// Start of the current replay, in ring frames.
     frame: f64,
-    /// How much of this life was said, in bytes.
+    /// Number of bytes sent in the current replay.
     said: usize,
 }
 
 impl Crowd {
-    /// Opens a port, `HOST:PORT`, for `count` robots. Robot `n` lives life `n` modulo their number, and begins `n / count` of
-    /// the way through the first half of it.
+    /// Opens a port, `HOST:PORT`, for `count` robots. Robot `n` replays life `n` modulo the number of lives, and starts
+    /// at the fraction `n / count` of its first half.
     ///
     /// # Errors
-    /// When the address is not this computer's, or taken.
+    /// If the address is not one of this computer, or is in use.
     ///
     /// # Panics
-    /// When there is no life, or one of no ring frames.
+    /// If there is no life, or one without ring frames.
     pub fn bind(address: &str, lives: Vec<Life>, count: usize, afterwards: Afterwards) -> io::Result<Self> {
-        assert!(!lives.is_empty() && lives.iter().all(|life| life.frames() > 0), "a robot needs something to say");
+        assert!(!lives.is_empty() && lives.iter().all(|life| life.frames() > 0), "every robot needs a recording");
         let port = TcpListener::bind(address)?;
         port.set_nonblocking(true)?;
         cost::expect_many(&port, count)?;
         Ok(Self { port, lives, count, afterwards, speakers: Vec::new() })
     }
 
-    /// The address that it listens at.
+    /// The address of the listening socket.
     ///
     /// # Errors
-    /// When the system does not know it.
+    /// If the operating system does not report it.
     pub fn address(&self) -> io::Result<SocketAddr> {
         self.port.local_addr()
     }
 
-    /// How many robots someone ever listened to.
+    /// Number of robots that have ever been connected.
     pub const fn met(&self) -> usize {
         self.speakers.len()
     }
 
-    /// How many robots someone listens to.
+    /// Number of connected robots.
     pub fn heard(&self) -> usize {
         self.speakers.iter().flatten().count()
     }
 
-    /// Lets all robots live on by some time, which is of no account when the pace is unbounded; never waits. Gives how many
-    /// bytes were said.
+    /// Advances all robots by some time, which is ignored at unlimited pace; never blocks. Returns the number of bytes
+    /// sent.
     pub fn live(&mut self, time: Duration, pace: Pace) -> usize {
         self.accept();
         let mut said = 0;
@@ -174,7 +174,7 @@ impl Crowd {
             let number = self.speakers.len();
             let life_number = number % self.lives.len();
             let life = &self.lives[life_number];
-            // The fraction spreads the robots over a ring frame, so that they do not all speak at once.
+            // The fraction distributes the robots over a ring frame, so that they do not all send at once.
             let frame = number as f64 / self.count as f64 * (life.frames() as f64 / 2.0);
             let speaker = Speaker { stream, life: life_number, frame, said: life.bytes_before(frame as usize) };
             self.speakers.push(speaker.prepare().ok());

@@ -1,10 +1,10 @@
-//! Many robots, one listener: a thread that hears a thousand TCP lines.
+//! Monitors a thousand robots over TCP in a single thread.
 //!
-//! | Part | Is |
+//! | Module | Purpose |
 //! |---|---|
-//! | [`Fleet`] | the listening side: a [`Listener`] for each robot, fed when its line has something |
-//! | [`crowd`] | the robots' side for trying and measuring: recorded robots that speak again and again |
-//! | [`cost`] | what this process has used of the computer |
+//! | [`Fleet`] | the monitoring side: a [`Listener`] for each robot, fed when its line is readable |
+//! | [`crowd`] | the robots' side, for tests and measurements: recorded robots that repeat their streams |
+//! | [`cost`] | the resources that this process uses |
 //!
 //! ```
 //! use std::{io::Write, net::TcpListener, time::Duration};
@@ -36,22 +36,23 @@ use toposlam::wire::Message;
 
 use toposlam_link::listener::{Event, Listener};
 
-/// What is read of one robot before the next one has its turn.
+/// Maximum number of bytes read from one robot per turn.
 const READ_BYTES: usize = 1 << 14;
-/// How many robots are told of in one look at all lines.
+/// Maximum number of robots reported by one poll.
 const EVENTS: usize = 1024;
-/// On epoll and kqueue a read that does not fill the buffer has emptied the line; elsewhere only one that would wait has.
+/// On epoll and kqueue a read that does not fill the buffer has emptied the line; elsewhere only a read that would
+/// block has.
 const SHORT_READ_EMPTIES: bool = cfg!(any(target_os = "linux", target_os = "android", target_vendor = "apple"));
 
-/// One listener to many robots.
+/// A monitor of many robots.
 ///
-/// Memory: [`Robot`] a robot and one buffer for all, and what the system keeps for a TCP connection. A robot that fails,
-/// goes away or sends what is no message does not disturb the others; it is not connected again.
+/// Memory: one [`Robot`] per robot, one shared buffer, and the operating system's buffers for each TCP connection. A
+/// robot that fails, disconnects or sends invalid data does not affect the others; it is not reconnected.
 pub struct Fleet {
     poll: Poll,
     events: Events,
     robots: Vec<Robot>,
-    /// Robots with something left to read.
+    /// Robots with unread data.
     ready: Vec<usize>,
     buffer: Box<[u8]>,
 }
@@ -62,7 +63,7 @@ pub struct Robot {
     name: Box<str>,
     line: Line,
     is_ready: bool,
-    /// The robot has closed its end; what it said before is still to be read.
+    /// The robot has closed its end; unread data may remain.
     is_ending: bool,
     listener: Listener,
     bytes: u64,
@@ -77,7 +78,7 @@ enum Line {
     Ended(End),
 }
 
-/// Why a robot is not heard any more.
+/// Why a robot is no longer monitored.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum End {
     /// The robot closed the line.
@@ -86,10 +87,10 @@ pub enum End {
     Failed(ErrorKind),
 }
 
-/// A fleet in numbers. Counts are since the start.
+/// Totals of a fleet. Counts are since the start.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Totals {
-    /// Robots that have not answered yet.
+    /// Robots that are still connecting.
     pub connecting: usize,
     /// Robots whose line is open.
     pub connected: usize,
@@ -97,25 +98,25 @@ pub struct Totals {
     pub closed: usize,
     /// Robots whose line could not be opened, or failed.
     pub failed: usize,
-    /// Robots whose map is known to be heard whole, whether or not their line is still open.
+    /// Robots whose map is known to be complete, whether or not their line is still open.
     pub converged: usize,
     /// Messages.
     pub messages: u64,
-    /// Bytes, whatever they were.
+    /// Bytes, valid or not.
     pub bytes: u64,
-    /// Places that the robots found: each is an update of a map.
+    /// Places that the robots detected; each is a map update.
     pub places: u64,
-    /// Frames that are missing.
+    /// Lost frames.
     pub lost: u64,
-    /// Frames that were no message: damaged, or of another release.
+    /// Frames that failed to decode: damaged, or of another release.
     pub damaged: u64,
 }
 
 impl Fleet {
-    /// A fleet of no robots.
+    /// A fleet without robots.
     ///
     /// # Errors
-    /// When the system lets nobody wait for many lines.
+    /// If the operating system provides no polling of many lines.
     pub fn new() -> io::Result<Self> {
         Ok(Self {
             poll: Poll::new()?,
@@ -126,8 +127,9 @@ impl Fleet {
         })
     }
 
-    /// Starts to connect to a robot at `HOST:PORT` and gives its number, 0 for the first; does not wait for it, but for the
-    /// name of its host. One that does not answer has a number as well, and [`Robot::end`] says why once the system gives up.
+    /// Starts to connect to a robot at `HOST:PORT` and returns its index, from 0. Blocks only for the resolution of the
+    /// host name. A robot that cannot be reached keeps its index, and [`Robot::end`] gives the reason after the
+    /// connection times out.
     pub fn connect(&mut self, name: &str, address: &str) -> usize {
         let number = self.robots.len();
         let line = match self.open(address, number) {
@@ -150,17 +152,16 @@ impl Fleet {
         let address = address.to_socket_addrs()?.next().ok_or(ErrorKind::NotFound)?;
         let mut stream = TcpStream::connect(address)?;
         cost::bound_receiving(&stream)?;
-        // It becomes writable when it is connected.
+        // The socket becomes writable when it is connected.
         self.poll.registry().register(&mut stream, Token(number), Interest::READABLE | Interest::WRITABLE)?;
         Ok(stream)
     }
 
-    /// Waits until a robot says something, `timeout` at most, and hears every robot that has something to say, a piece of it
-    /// each: a robot that never stops does not keep the others waiting. `heard` gets the robot's number, its
-    /// listener, and what it heard.
+    /// Waits for data, at most for `timeout`, and reads one piece from every robot that has some, so that a robot that
+    /// never pauses does not block the others. `heard` gets the robot's index, its listener, and the event.
     ///
     /// # Errors
-    /// When the system fails; what a robot's line does is no error.
+    /// If the operating system fails; a failed line is not an error.
     pub fn listen(&mut self, timeout: Duration, mut heard: impl FnMut(usize, &Listener, Event<'_>)) -> io::Result<()> {
         let timeout = if self.ready.is_empty() { timeout } else { Duration::ZERO };
         match self.poll.poll(&mut self.events, Some(timeout)) {
@@ -172,7 +173,7 @@ impl Fleet {
             if !std::mem::replace(&mut self.robots[number].is_ready, true) {
                 self.ready.push(number);
             }
-            // The end of the line makes no event of its own when it comes together with the last bytes.
+            // The end of the line has no event of its own if it arrives together with the last bytes.
             self.robots[number].is_ending |= event.is_read_closed();
         }
         let (robots, buffer) = (&mut self.robots, &mut self.buffer);
@@ -184,12 +185,12 @@ impl Fleet {
         Ok(())
     }
 
-    /// The robots by their numbers.
+    /// The robots by index.
     pub fn robots(&self) -> &[Robot] {
         &self.robots
     }
 
-    /// All robots in numbers. Cost: [`toposlam::wire::MapReplica::is_converged`] for each.
+    /// Totals of all robots. Cost: [`toposlam::wire::MapReplica::is_converged`] for each.
     pub fn totals(&self) -> Totals {
         let mut totals = Totals::default();
         for robot in &self.robots {
@@ -216,7 +217,7 @@ impl Fleet {
 }
 
 impl Line {
-    /// Looks what became of the connection.
+    /// Checks the result of the connection.
     fn settle(&mut self) {
         let Self::Opening(stream) = self else { return };
         let result = stream.take_error().and_then(|error| error.map_or(Ok(()), Err)).and_then(|()| stream.peer_addr());
@@ -230,17 +231,17 @@ impl Line {
 }
 
 impl Robot {
-    /// The name that it was given.
+    /// The name of the robot.
     pub fn name(&self) -> &str {
         &self.name
     }
 
-    /// All that is known of it.
+    /// The state of the robot.
     pub const fn listener(&self) -> &Listener {
         &self.listener
     }
 
-    /// Why it is not heard any more; `None` while it is.
+    /// Why the robot is no longer monitored; `None` while it is.
     pub const fn end(&self) -> Option<End> {
         match self.line {
             Line::Opening(_) | Line::Open(_) => None,
@@ -248,22 +249,22 @@ impl Robot {
         }
     }
 
-    /// Whether its map is known to be heard whole. A robot of which nothing was heard has no map to be whole.
+    /// Whether the map is known to be complete; `false` before the first message.
     pub fn is_converged(&self) -> bool {
         self.listener.replica().is_converged()
     }
 
-    /// How many bytes it sent.
+    /// Number of received bytes.
     pub const fn bytes(&self) -> u64 {
         self.bytes
     }
 
-    /// How many places it found while it was heard.
+    /// Number of places that the robot detected while it was monitored.
     pub const fn places(&self) -> u64 {
         self.places
     }
 
-    /// Reads a piece; whether there may be more.
+    /// Reads a piece; returns whether there may be more.
     fn read(&mut self, buffer: &mut [u8], mut heard: impl FnMut(&Listener, Event<'_>)) -> bool {
         self.line.settle();
         let Line::Open(stream) = &mut self.line else { return false };
@@ -286,7 +287,7 @@ impl Robot {
                 kind => End::Failed(kind),
             },
         };
-        // Closing the line takes it out of the poll.
+        // Closing the line removes it from the poll.
         self.line = Line::Ended(end);
         false
     }

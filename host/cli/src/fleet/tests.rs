@@ -17,7 +17,7 @@ fn lives() -> Vec<Life> {
 }
 
 #[test]
-fn a_robot_that_dies_and_one_that_talks_nonsense_do_not_disturb_the_others() {
+fn a_closed_line_and_invalid_data_do_not_affect_other_robots() {
     const ROBOTS: usize = 20;
     let lives = lives();
     let maps: Vec<_> = lives.iter().map(|life| life.map().clone()).collect();
@@ -46,7 +46,7 @@ fn a_robot_that_dies_and_one_that_talks_nonsense_do_not_disturb_the_others() {
     loop {
         let piece = crowd.live(Duration::ZERO, Pace::Unbounded);
         said += piece as u64;
-        // What does not fit, because the fleet is behind, is not said.
+        // Bytes that do not fit, because the fleet is behind, are not sent.
         let _ = nonsense_end.write(&garbage);
         fleet.listen(PATIENCE, |_, _, event| messages += u64::from(matches!(event, Event::Message(..)))).unwrap();
         let heard: u64 = fleet.robots()[..ROBOTS].iter().map(Robot::bytes).sum();
@@ -73,7 +73,7 @@ fn a_robot_that_dies_and_one_that_talks_nonsense_do_not_disturb_the_others() {
 }
 
 #[test]
-fn a_robot_that_starts_anew_is_no_robot_that_loses_frames() {
+fn a_restart_of_a_robot_does_not_count_as_lost_frames() {
     let life = Life::record(&Plan::built_in("flat").unwrap(), 1, 300).unwrap();
     let twice = 2 * life.bytes() as u64;
     let mut crowd = Crowd::bind("127.0.0.1:0", vec![life], 1, Afterwards::Again).unwrap();

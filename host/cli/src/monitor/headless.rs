@@ -1,4 +1,4 @@
-//! The monitor without a screen: a line of text for each event, for scripts and logs.
+//! The monitor without a screen: writes a line of text for each event, for scripts and logs.
 
 use std::io::{self, Write};
 use std::sync::mpsc::{RecvTimeoutError, sync_channel};
@@ -10,33 +10,33 @@ use serde_json::{Value, json};
 use toposlam_link::link::{Link, News, Options, Source};
 use toposlam_link::{event_text, json};
 
-/// News that wait to be written; a link that has more to say waits.
+/// Maximum number of queued news; then the link waits.
 const QUEUE: usize = 1024;
 
-/// How events are written.
+/// Output format of events.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Form {
-    /// In plain words.
+    /// As text.
     Words,
-    /// As one JSON object each.
+    /// As one JSON object per line.
     Json,
 }
 
-/// When to stop.
+/// Limits of a run.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Limits {
-    /// After so many messages and damages.
+    /// Number of messages and decoding errors.
     pub events: Option<u64>,
-    /// After this time.
+    /// Duration.
     pub time: Option<Duration>,
 }
 
-/// Writes what is heard until a limit is reached, the standard input ends, or nobody reads what is written.
+/// Writes events until a limit is reached, the standard input ends, or the reader of the output closes it.
 ///
-/// `name` is the name of the line, `-` for the standard input. A line that is cut is opened again.
+/// `name` is the name of the line, `-` for the standard input. A failed line is reopened.
 ///
 /// # Errors
-/// When the time is over before so many events came, or before any came, and when nothing can be written.
+/// If the time is over before the requested number of events, or before any event, and if the output cannot be written.
 pub fn run(
     name: &str,
     baud: u32,
@@ -59,7 +59,7 @@ pub fn run(
         events += u64::from(matches!(news, News::Heard(..)));
         let is_over = matches!(news, News::Ended);
         if let Err(error) = write_line(&news, name, form, &mut out) {
-            // Whoever read this has seen enough.
+            // The reader has closed the output.
             return if error.kind() == io::ErrorKind::BrokenPipe { Ok(()) } else { Err(error).context("writing") };
         }
         if is_over {

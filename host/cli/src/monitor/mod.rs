@@ -1,11 +1,11 @@
-//! A live view of a robot in a terminal: its map, where it is and why it believes so, with a key for every command.
+//! Live view of a robot in a terminal: map, location, beliefs and their evidence, and a key for every command.
 //!
-//! | Part | Is |
+//! | Module | Purpose |
 //! |---|---|
-//! | [`model`] | all that is shown; it takes in news of a [`link`](toposlam_link::link) and keys, and says what to do |
-//! | [`view`] | the model on a ratatui frame; it changes nothing |
-//! | [`headless`] | a line of text for each event instead |
-//! | [`screen`] | the real terminal, and the loop between link, keys and frame |
+//! | [`model`] | the displayed state; processes news of a [`link`](toposlam_link::link) and keys, and returns actions |
+//! | [`view`] | draws the model on a ratatui frame, without changing it |
+//! | [`headless`] | writes a line of text for each event instead |
+//! | [`screen`] | the terminal, and the event loop for link, keys and frames |
 //!
 //! The model and the view need no terminal:
 //!

@@ -1,6 +1,6 @@
-//! What the monitor shows: it takes in news of the link and keys, and says what to do.
+//! Model of the monitor: processes news of the link and keys, and returns actions.
 //!
-//! Nothing here knows of a terminal or a line; the time comes from outside.
+//! Independent of terminal and line; the caller supplies the time.
 
 use std::collections::VecDeque;
 use std::time::{Duration, Instant};
@@ -28,20 +28,20 @@ pub struct Model {
     prompt: Option<Prompt>,
     helps: bool,
     pane: Pane,
-    /// The first vertex of the table.
+    /// First visible vertex of the table.
     scroll: usize,
 }
 
-/// What to do after a key.
+/// The action of a key.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Action {
-    /// Have the link do something.
+    /// Start a task on the link.
     Start(Task),
     /// End the monitor.
     Quit,
 }
 
-/// What is shown in the place of the map, where there is no room for all.
+/// The selected pane, on a screen without room for all panes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Pane {
     Map,
@@ -65,7 +65,7 @@ pub(super) struct Entry {
     pub(super) text: String,
 }
 
-/// What the robot does, as far as it was told and has answered.
+/// The robot's mode, as far as its replies confirm it.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Told {
     pub(super) paused: Option<bool>,
@@ -74,7 +74,7 @@ pub(super) struct Told {
 }
 
 impl Model {
-    /// A monitor of a line of that name that has heard nothing; `-` is the standard input, on which nothing can be told.
+    /// A monitor of the named line that has received nothing; `-` is the standard input, which is read-only.
     pub fn new(line: &str) -> Self {
         Self {
             watch: Watch::new(line),
@@ -90,7 +90,7 @@ impl Model {
         }
     }
 
-    /// Takes in what happened on the link.
+    /// Processes an event of the link.
     pub fn hear(&mut self, news: News, now: Instant) {
         match &news {
             News::Connected => {
@@ -156,7 +156,7 @@ impl Model {
         }
     }
 
-    /// Takes in a key; says what is to be done then, if anything.
+    /// Processes a key; returns its action, if any.
     pub fn press(&mut self, key: KeyEvent) -> Option<Action> {
         if key.kind == KeyEventKind::Release {
             return None;
@@ -198,7 +198,7 @@ impl Model {
         }
     }
 
-    /// The keys that tell the robot something.
+    /// The keys that send commands.
     fn begin(&mut self, key: char) -> Option<Action> {
         let wanted = match key {
             'i' => Ok(Command::Info),
@@ -247,18 +247,18 @@ impl Model {
         Action::Start(task)
     }
 
-    /// To be called before drawing: arranges the map if it has changed, and tells how long nothing was heard.
+    /// Arranges the map if it has changed, and updates the time of silence. Call it before drawing.
     pub fn settle(&mut self, now: Instant) {
         self.watch.arrange();
         self.quiet = self.heard_at.map(|heard_at| now.saturating_duration_since(heard_at));
     }
 
-    /// What is known of the robot.
+    /// The state of the robot.
     pub const fn watch(&self) -> &Watch {
         &self.watch
     }
 
-    /// Whether nothing can be told.
+    /// Whether commands cannot be sent.
     pub fn is_read_only(&self) -> bool {
         self.watch.line() == "-"
     }

@@ -1,4 +1,4 @@
-//! What the monitor asks before it can tell the robot something: a vertex, a file, a setting, or whether it is meant.
+//! Prompts of the monitor: for a vertex, a file, a setting, or a confirmation.
 
 use std::path::PathBuf;
 
@@ -7,14 +7,14 @@ use toposlam::wire::Command;
 use toposlam_link::link::Task;
 use toposlam_link::setting;
 
-/// A question and what was typed so far.
+/// A prompt and the text typed so far.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) struct Prompt {
     question: Question,
     text: String,
 }
 
-/// What is asked.
+/// The kind of prompt.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Question {
     GoTo,
@@ -37,7 +37,7 @@ impl Prompt {
         self.text.pop();
     }
 
-    /// The question, as it is shown.
+    /// The text of the prompt.
     pub(super) fn question(&self) -> String {
         match self.question {
             Question::GoTo => "go to which vertex? ".to_owned(),
@@ -52,7 +52,7 @@ impl Prompt {
         &self.text
     }
 
-    /// What is to be done, or why what was typed is no answer.
+    /// The task for the typed text, or why the text is invalid.
     pub(super) fn answer(&self) -> Result<Task, String> {
         let text = self.text.trim();
         if text.is_empty() {
@@ -89,7 +89,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_typed_becomes_a_task_or_is_said_to_be_none() {
+    fn a_typed_answer_becomes_a_task_or_an_error() {
         assert_eq!(answer(Question::GoTo, "3"), Ok(Task::Tell(Command::GoTo { vertex: 3 })));
         assert!(answer(Question::GoTo, "256").unwrap_err().contains("256"));
         assert_eq!(answer(Question::Snapshot, " a b "), Ok(Task::Snapshot("a b".into())));

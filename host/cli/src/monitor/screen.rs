@@ -1,4 +1,4 @@
-//! The monitor on the terminal that this program runs in.
+//! The monitor in the terminal of this program.
 
 use std::io::{self, IsTerminal, Stdout, stdout};
 use std::ops::ControlFlow;
@@ -20,15 +20,15 @@ use super::model::{Action, Model};
 use super::view;
 use toposlam_link::link::{Link, News, Options, Source};
 
-/// News that wait to be taken in; a link that has more to say waits.
+/// Maximum number of queued news; then the link waits.
 const QUEUE: usize = 1024;
-/// What a robot says of a place comes in one burst: a frame waits so long for the rest of it, or it would be drawn with the next one.
+/// Delay before drawing: the messages of a place arrive in a burst, and a frame should show all of them.
 const BURST_TIME: Duration = Duration::from_millis(2);
-/// There is nothing to see in more frames than this, and a slow line would only fall behind.
+/// Minimum interval between frames; more are not visible, and a slow connection would fall behind.
 const LEAST_FRAME_TIME: Duration = Duration::from_millis(16);
-/// Without news the frame is drawn this often, for what depends on the time.
+/// Interval of redrawing without news, for values that depend on the time.
 const IDLE_FRAME_TIME: Duration = Duration::from_millis(250);
-/// How often the thread of the keys looks whether it is still needed.
+/// Polling interval at which the keyboard thread checks whether it should end.
 const KEY_PATIENCE: Duration = Duration::from_millis(100);
 
 enum Input {
@@ -38,12 +38,12 @@ enum Input {
     Failed(io::Error),
 }
 
-/// Shows a robot until a key, a signal or `drawn` ends it, which is called after each frame with what is shown.
+/// Shows a robot until a key, a signal or `drawn` ends it. Calls `drawn` after each frame with the model.
 ///
-/// `name` is the name of the line, `-` for the standard input; the keys come from the terminal even then.
+/// `name` is the name of the line, `-` for the standard input; keys are always read from the terminal.
 ///
 /// # Errors
-/// When the standard output is no terminal, or the terminal fails.
+/// If the standard output is not a terminal, or the terminal fails.
 pub fn run(
     name: &str,
     baud: u32,
@@ -122,7 +122,7 @@ fn send_keys(inputs: &SyncSender<Input>, ended: &AtomicBool) {
             Ok(Some(Event::Resize(..))) => Input::Resized,
             Ok(_) => continue,
             Err(error) => {
-                // Whoever would hear of it is gone.
+                // The receiver is gone.
                 let _ = inputs.send(Input::Failed(error));
                 return;
             }
@@ -133,7 +133,7 @@ fn send_keys(inputs: &SyncSender<Input>, ended: &AtomicBool) {
     }
 }
 
-/// The terminal while the monitor has it; it is given back as it was, in whatever way this ends.
+/// The terminal in use by the monitor; its previous state is restored on every exit path.
 struct Screen {
     terminal: Terminal<CrosstermBackend<Stdout>>,
 }
@@ -164,13 +164,13 @@ impl Drop for Screen {
     }
 }
 
-/// Whether the terminal is to be given back.
+/// Whether the terminal must be restored.
 static IS_TAKEN: AtomicBool = AtomicBool::new(false);
 
-/// Once only: leaving the screen again would put the cursor back to where it was, and a panic's message would be written over.
+/// Runs once: leaving the alternate screen again would reset the cursor, and a panic message would be overwritten.
 fn give_back() {
     if IS_TAKEN.swap(false, Ordering::Relaxed) {
-        // Nothing can be done about a terminal that does not take it.
+        // There is no recovery if the terminal fails here.
         let _ = disable_raw_mode();
         let _ = execute!(stdout(), LeaveAlternateScreen, Show);
     }

@@ -1,4 +1,4 @@
-//! The model and the view on what a simulated robot says.
+//! The model and the view of a simulated robot.
 
 use std::time::{Duration, Instant};
 
@@ -19,7 +19,7 @@ use toposlam_link::listener::Listener;
 use toposlam_sim::exploration::Exploration;
 use toposlam_sim::world::{Plan, RobotModel};
 
-/// A monitor and what it hears, without a line between.
+/// A monitor fed directly with messages, without a line.
 struct Watch {
     model: Model,
     listener: Listener,
@@ -46,7 +46,7 @@ impl Watch {
         self.hear_bytes(&bytes);
     }
 
-    /// What is on a screen of that size.
+    /// The text on a screen of the given size.
     fn screen(&mut self, width: u16, height: u16) -> String {
         self.model.settle(self.now);
         let mut terminal = Terminal::new(TestBackend::new(width, height)).unwrap();
@@ -64,7 +64,7 @@ impl Watch {
     }
 }
 
-/// A monitor that has watched a robot in the office from its start, and the robot's own map.
+/// A monitor that has received the whole stream of a robot in the office, and the robot's own map.
 fn office(places: usize) -> (Watch, Vec<(u8, u8)>, Vec<u16>) {
     let mut watch = Watch::new("tcp:robot:7070");
     let plan = Plan::built_in("office").unwrap();
@@ -86,7 +86,7 @@ fn hello() -> Hello {
 }
 
 #[test]
-fn a_wide_screen_shows_all_that_a_robot_says() {
+fn a_wide_screen_shows_map_location_beliefs_and_evidence() {
     let (mut watch, edges, radii) = office(40);
     let screen = watch.screen(140, 45);
     let picture = watch.listener.replica().clone();
@@ -109,14 +109,14 @@ fn a_wide_screen_shows_all_that_a_robot_says() {
 }
 
 #[test]
-fn a_small_screen_shows_one_pane_after_the_other_and_no_size_is_too_small() {
+fn a_small_screen_cycles_through_the_panes_and_any_size_works() {
     let (mut watch, _, radii) = office(40);
     let screen = watch.screen(80, 24);
     for word in ["map:", "this map", "rivals", "at vertex", "no faults", "heading"] {
         assert!(screen.contains(word), "{word}\n{screen}");
     }
     let seen = radii.iter().filter(|radius| screen.contains(&radius.to_string())).count();
-    assert!(2 * seen > radii.len(), "labels that are close hide each other, but not most\n{screen}");
+    assert!(2 * seen > radii.len(), "only labels close to each other may overlap\n{screen}");
     for title in ["edges to", "rim at", "what it does", "map:"] {
         assert_eq!(watch.press(KeyCode::Tab), None);
         assert!(watch.screen(40, 10).contains(title), "{title}");
@@ -127,7 +127,7 @@ fn a_small_screen_shows_one_pane_after_the_other_and_no_size_is_too_small() {
 }
 
 #[test]
-fn vertices_that_have_no_room_are_scrolled_to() {
+fn the_vertex_table_scrolls() {
     let (mut watch, _, radii) = office(40);
     watch.press(KeyCode::Tab);
     let last = radii.last().unwrap().to_string();
@@ -139,7 +139,7 @@ fn vertices_that_have_no_room_are_scrolled_to() {
 }
 
 #[test]
-fn another_version_is_a_banner_and_other_messages_an_alarm() {
+fn another_version_shows_a_banner_and_another_schema_an_alarm() {
     let mut watch = Watch::new("tcp:robot:7070");
     watch.hear(&Message::Hello(hello()));
     let screen = watch.screen(100, 30);
@@ -154,7 +154,7 @@ fn another_version_is_a_banner_and_other_messages_an_alarm() {
 }
 
 #[test]
-fn faults_are_named_counted_and_told_once() {
+fn faults_are_named_and_counted_and_logged_once() {
     let mut watch = Watch::new("tcp:robot:7070");
     for count in [2, 2, 3] {
         watch.hear(&Message::Fault { kind: 14, count });
@@ -195,7 +195,7 @@ fn a_ring_frame_is_drawn_with_its_silent_and_dead_sonars() {
 }
 
 #[test]
-fn a_cut_line_and_a_silent_robot_are_said_above_everything() {
+fn a_cut_line_and_a_silent_robot_are_reported_at_the_top() {
     let mut watch = Watch::new("tcp:robot:7070");
     assert!(!watch.screen(80, 24).contains("nothing was heard"));
     watch.now += Duration::from_secs(7);
@@ -236,7 +236,7 @@ fn every_command_of_the_wire_has_a_key() {
 }
 
 #[test]
-fn a_question_is_shown_and_can_be_left_or_answered_wrongly() {
+fn a_prompt_is_shown_and_can_be_cancelled_or_answered_wrongly() {
     let mut watch = Watch::new("tcp:robot:7070");
     watch.press(KeyCode::Char('x'));
     assert!(watch.screen(80, 24).contains("forget the whole map?"));
@@ -246,19 +246,19 @@ fn a_question_is_shown_and_can_be_left_or_answered_wrongly() {
     assert_eq!(watch.press(KeyCode::Char('7')), None);
     watch.press(KeyCode::Backspace);
     watch.press(KeyCode::Char('q'));
-    assert!(watch.screen(80, 24).contains("which vertex? q"), "letters go to the question");
+    assert!(watch.screen(80, 24).contains("which vertex? q"), "letters go to the prompt");
     watch.press(KeyCode::Esc);
     assert!(!watch.screen(80, 24).contains("which vertex?"));
 }
 
 #[test]
-fn the_keys_are_explained() {
+fn the_help_lists_the_keys() {
     let mut watch = Watch::new("tcp:robot:7070");
     watch.press(KeyCode::Char('?'));
     let screen = watch.screen(80, 24);
     assert!(screen.contains("reset: forget the map") && screen.contains("quit"), "{screen}");
     assert_eq!(watch.press(KeyCode::Char('x')), None);
-    assert!(!watch.screen(80, 24).contains("forget the"), "the key only went back");
+    assert!(!watch.screen(80, 24).contains("forget the"), "the key only closed the help");
 }
 
 #[test]
@@ -282,7 +282,7 @@ fn replies_and_refusals_are_shown() {
 }
 
 #[test]
-fn nothing_can_be_told_on_the_standard_input() {
+fn the_standard_input_is_read_only() {
     let mut watch = Watch::new("-");
     for key in "iuepclmgsrtx".chars() {
         assert_eq!(watch.press(KeyCode::Char(key)), None);
@@ -306,7 +306,7 @@ fn goals_and_remapped_vertices_are_shown() {
 }
 
 #[test]
-fn a_robot_that_starts_anew_is_said_to_and_its_map_is_forgotten() {
+fn a_restart_of_the_robot_is_reported_and_clears_the_map() {
     let mut watch = Watch::new("tcp:robot:7070");
     watch.hear(&Message::Hello(hello()));
     watch.hear(&Message::Edge { a: 0, b: 1, present: true });

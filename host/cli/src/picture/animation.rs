@@ -1,6 +1,6 @@
-//! The map as it grows, over its floor plan: an animated SVG that repeats.
+//! Animated SVG of a growing map over its floor plan, which repeats.
 //!
-//! Each vertex, edge and word is drawn once, and shown during the steps whose map has it.
+//! Each vertex, edge and text is drawn once, and visible during the steps whose map contains it.
 
 use std::collections::BTreeMap;
 
@@ -11,22 +11,22 @@ use super::{Drawing, MARGIN_MM, walls};
 use toposlam_link::export::marks::{DOT_MM, MAP_COLOUR, ROBOT_COLOUR, words};
 use toposlam_sim::world::{Plan, Point};
 
-/// How long the drive lasts in the picture, and how long its last map is shown, in seconds.
+/// Durations of the animated drive and of its last map, in seconds.
 const DRIVE_S: f64 = 24.0;
 const PAUSE_S: f64 = 4.0;
-/// The robot's way has at most this many points.
+/// Maximum number of points of the robot's path.
 const WAY_POINTS: usize = 600;
 
 /// The map after one place.
 #[derive(Clone, Debug)]
 pub struct Step {
-    /// The map, with each vertex where it is drawn.
+    /// The map, with the position of each drawn vertex.
     pub drawing: Drawing,
-    /// How many points of the way the robot has driven by then.
+    /// Number of points of the path driven so far.
     pub driven: usize,
 }
 
-/// An element of the picture: what it looks like decides whether it is the same in two steps.
+/// An element of the drawing. Elements with the same appearance are the same in two steps.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
 enum Element {
     Edge([i64; 4]),
@@ -35,9 +35,10 @@ enum Element {
     Caption(String),
 }
 
-/// Draws the steps of a map over its floor plan, with the robot and its way. `way` has the robot's position in each ring frame.
+/// Draws the steps of a map over its floor plan, with the robot and its path. `way` has the robot's position in each
+/// ring frame.
 ///
-/// The document has one unit for 1 mm of the building and repeats every 28 seconds.
+/// One unit of the document is 1 mm of the building; the animation repeats every 28 seconds.
 pub fn animate(plan: &Plan, way: &[Point], steps: &[Step]) -> String {
     let (width_mm, height_mm) = (plan.width_mm(), plan.height_mm());
     let at = |point: Point| (point.x_mm, height_mm - point.y_mm);
@@ -59,7 +60,7 @@ pub fn animate(plan: &Plan, way: &[Point], steps: &[Step]) -> String {
     document.add(robot).to_string()
 }
 
-/// When things happen, as shares of the whole duration.
+/// Times of events, as fractions of the whole duration.
 struct Timeline {
     way: usize,
 }
@@ -94,7 +95,7 @@ fn repeating(attribute: &str) -> Animate {
         .set("repeatCount", "indefinite")
 }
 
-/// The robot and the way behind it.
+/// The robot and the path behind it.
 fn robot(way: &[Point], at: impl Fn(Point) -> (f64, f64), timeline: &Timeline) -> (Polyline, Circle) {
     let stride = way.len().div_ceil(WAY_POINTS).max(1);
     let points: Vec<(f64, f64)> = way.iter().step_by(stride).map(|point| at(*point)).collect();
@@ -132,7 +133,7 @@ fn robot(way: &[Point], at: impl Fn(Point) -> (f64, f64), timeline: &Timeline) -
     (trail, robot)
 }
 
-/// Every element with the steps that show it, as half-open intervals; edges lie below discs, discs below vertices.
+/// Every element with the steps that show it, as half-open intervals; edges are below discs, discs below vertices.
 fn intervals(steps: &[Step], at: impl Fn(Point) -> (f64, f64)) -> BTreeMap<Element, Vec<(usize, usize)>> {
     let mut elements: BTreeMap<Element, Vec<(usize, usize)>> = BTreeMap::new();
     for (index, step) in steps.iter().enumerate() {
@@ -156,7 +157,7 @@ fn elements_of(drawing: &Drawing, at: impl Fn(Point) -> (f64, f64)) -> Vec<Eleme
     let mut elements = vec![Element::Caption(drawing.caption.clone())];
     for vertex in &drawing.vertices {
         let [x, y] = rounded(vertex.position);
-        // To 50 mm, so that a disc is not another one after each visit.
+        // Rounded to 50 mm, so that a disc does not become a new element with each visit.
         elements.push(Element::Disc([x, y, 50 * (vertex.radius_mm / 50.0).round() as i64]));
         elements.push(Element::Vertex([x, y], vertex.name.clone()));
     }
@@ -210,7 +211,7 @@ mod tests {
     }
 
     #[test]
-    fn an_element_is_drawn_once_and_shown_while_a_map_has_it() {
+    fn an_element_is_drawn_once_and_shown_while_the_map_contains_it() {
         let plan = Plan::built_in("ring").unwrap();
         let way: Vec<Point> = (0..100).map(|frame| Point::new(10.0 * f64::from(frame), 1000.0)).collect();
         let steps = [

@@ -1,4 +1,4 @@
-//! Pictures: a map over its floor plan, as SVG.
+//! Drawings of a map over its floor plan, as SVG.
 
 mod animation;
 
@@ -13,30 +13,30 @@ use toposlam::Map;
 use toposlam_link::export::marks::{self, MAP_COLOUR, Mark, words};
 use toposlam_sim::world::{Detection, Plan, Point, TrueMap};
 
-/// A vertex of the map to be drawn.
+/// A vertex of the map to draw.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Vertex {
-    /// Where it belongs; vertices in the same spot are drawn side by side.
+    /// True position; vertices at the same position are drawn side by side.
     pub position: Point,
-    /// The radius of its fingerprint, in millimetres.
+    /// Radius of its fingerprint, in millimetres.
     pub radius_mm: f64,
-    /// What is written on it.
+    /// Text of the label.
     pub name: String,
 }
 
-/// A map to be drawn.
+/// A map to draw.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Drawing {
     /// The vertices.
     pub vertices: Vec<Vertex>,
-    /// The edges, as indices of vertices; an edge from a vertex to itself is a loop.
+    /// The edges, as indices of vertices; an edge from a vertex to itself is a self-loop.
     pub edges: Vec<(usize, usize)>,
-    /// What is written below.
+    /// The caption.
     pub caption: String,
 }
 
 impl Drawing {
-    /// A map as a drawing, each vertex where the true node is that it was mostly taken for.
+    /// A map with each vertex at the true node of the majority of its visits.
     pub fn of_map<const V: usize>(
         map: &Map<V>,
         path: &[Option<usize>],
@@ -55,7 +55,7 @@ impl Drawing {
         Self { vertices: vertices.collect(), edges, caption }
     }
 
-    /// The truth as a drawing, its nodes labelled with their number and radius.
+    /// The ground truth, with nodes labelled by number and radius.
     pub fn of_truth(map: &TrueMap, caption: String) -> Self {
         let vertices = map.nodes.iter().enumerate().map(|(index, node)| Vertex {
             position: node.position,
@@ -67,7 +67,7 @@ impl Drawing {
     }
 }
 
-/// The mean position of the visits at the node that most of them were at.
+/// Mean position of the visits at the node with most of them.
 fn mostly_at(visits: &[Detection]) -> Point {
     let at = |node: Option<usize>| visits.iter().filter(move |visit| visit.node == node);
     let node = visits.iter().map(|visit| visit.node).max_by_key(|node| (at(*node).count(), Reverse(*node)));
@@ -78,10 +78,10 @@ fn mostly_at(visits: &[Detection]) -> Point {
 }
 
 const MARGIN_MM: f64 = 600.0;
-/// Vertices nearer than this to each other are drawn this far apart.
+/// Minimum distance between two drawn vertices.
 const SIDE_BY_SIDE_MM: f64 = 1100.0;
 
-/// Where each vertex is drawn: those in one spot in a row, so that none hides another.
+/// Position of each drawn vertex: those at one position are in a row, so that none hides another.
 fn spread(vertices: &[Vertex]) -> Vec<Point> {
     let mut spots: Vec<(Point, Vec<usize>)> = Vec::new();
     for (index, vertex) in vertices.iter().enumerate() {
@@ -100,13 +100,13 @@ fn spread(vertices: &[Vertex]) -> Vec<Point> {
     points
 }
 
-/// Draws a map over its floor plan: walls grey, the true Voronoi graph blue, each vertex with its name, its radius and
-/// the disc of that radius.
+/// Draws a map over its floor plan: walls grey, the true Voronoi graph blue, and each vertex with its label, its radius
+/// and the disc of that radius.
 ///
-/// One unit of the picture is 1 mm of the building; edges of the map that name no vertex are left out.
+/// One unit of the drawing is 1 mm of the building. Edges to unknown vertices are omitted.
 pub fn draw(plan: &Plan, truth: &TrueMap, drawing: &Drawing) -> String {
     let (width_mm, height_mm) = (plan.width_mm(), plan.height_mm());
-    // The building's y axis points up, the picture's down.
+    // The y axis of the building points up, that of SVG down.
     let at = |point: Point| (point.x_mm, height_mm - point.y_mm);
     let document = Document::new()
         .set("viewBox", (0, 0, width_mm, height_mm + 2.0 * MARGIN_MM))
@@ -146,7 +146,7 @@ pub fn draw(plan: &Plan, truth: &TrueMap, drawing: &Drawing) -> String {
         .to_string()
 }
 
-/// The wall cells, a rectangle for each run of them in a row.
+/// The wall cells, with one rectangle per run of cells in a row.
 fn walls(plan: &Plan) -> Path {
     let cell_mm = f64::from(plan.cell_mm());
     let (columns, rows) = (plan.columns() as i32, plan.rows() as i32);
@@ -173,7 +173,7 @@ mod tests {
     use toposlam::{Fingerprint, place::Place};
 
     #[test]
-    fn a_picture_holds_every_vertex_edge_and_way_and_its_words_are_escaped() {
+    fn a_drawing_has_every_vertex_and_edge_and_escaped_text() {
         let plan = Plan::built_in("ring").unwrap();
         let truth = TrueMap::of(&plan).unwrap();
         let mut drawing = Drawing::of_truth(&truth, "a < b & c".to_owned());
@@ -187,7 +187,7 @@ mod tests {
     }
 
     #[test]
-    fn vertices_in_one_spot_are_drawn_side_by_side_around_it() {
+    fn vertices_at_one_position_are_drawn_side_by_side() {
         let vertex = |x_mm| Vertex { position: Point::new(x_mm, 0.0), radius_mm: 1.0, name: String::new() };
         let points = spread(&[vertex(0.0), vertex(9000.0), vertex(10.0), vertex(20.0)]);
         let xs_mm: Vec<f64> = points.iter().map(|point| point.x_mm).collect();
@@ -195,7 +195,7 @@ mod tests {
     }
 
     #[test]
-    fn a_vertex_is_drawn_at_the_node_it_was_mostly_taken_for() {
+    fn a_vertex_is_drawn_at_the_node_of_most_of_its_visits() {
         let fingerprint = Fingerprint::from_radius_mm(1000).unwrap();
         let place = Place { fingerprint, frame_index: 0, degree: None, spread_mm: 0 };
         let visit = |x_mm, node| Detection { place, position: Point::new(x_mm, 0.0), node };

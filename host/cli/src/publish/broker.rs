@@ -1,4 +1,4 @@
-//! Which broker, and under which name.
+//! Address of the broker, and name of the robot.
 
 use std::fmt;
 use std::str::FromStr;
@@ -6,12 +6,12 @@ use std::str::FromStr;
 /// The port of MQTT without encryption.
 const DEFAULT_PORT: u16 = 1883;
 
-/// What is published, and where.
+/// What to publish, and to which broker.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Options {
     pub(super) broker: Broker,
     pub(super) robot: String,
-    /// Whether the frames are published as well, for another machine with a decoder.
+    /// Whether to publish the frames as well, for another machine with a decoder.
     pub frames: bool,
 }
 
@@ -19,7 +19,7 @@ impl Options {
     /// Publishes a robot's messages under its name, without its frames.
     ///
     /// # Errors
-    /// When the name is no level of a topic: when it is empty or holds `/`, `+`, `#` or NUL.
+    /// If the name is not a valid topic level: empty, or with `/`, `+`, `#` or NUL.
     pub fn new(broker: Broker, robot: &str) -> Result<Self, OptionError> {
         if robot.is_empty() || robot.contains(['/', '+', '#', '\0']) {
             return Err(OptionError::Name);
@@ -28,7 +28,7 @@ impl Options {
     }
 }
 
-/// Where a broker is: `mqtt://HOST`, `mqtt://HOST:PORT` or `mqtt://USER:PASSWORD@HOST:PORT`, without encryption.
+/// Address of a broker without encryption: `mqtt://HOST`, `mqtt://HOST:PORT` or `mqtt://USER:PASSWORD@HOST:PORT`.
 #[derive(Clone, PartialEq, Eq)]
 pub struct Broker {
     pub(super) host: String,
@@ -36,7 +36,7 @@ pub struct Broker {
     pub(super) login: Option<(String, String)>,
 }
 
-/// Without the password.
+/// Omits the password.
 impl fmt::Debug for Broker {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "mqtt://{}:{}", self.host, self.port)
@@ -53,7 +53,7 @@ impl FromStr for Broker {
             None => (None, rest),
         };
         let (host, port) = match place.rsplit_once(':') {
-            // The colons of an address in brackets are its own.
+            // The colons of an IPv6 address in brackets do not separate a port.
             Some((host, port)) if !port.ends_with(']') => (host, port.parse().map_err(|_| OptionError::Broker)?),
             _ => (place, DEFAULT_PORT),
         };
@@ -65,12 +65,12 @@ impl FromStr for Broker {
     }
 }
 
-/// Why there is nothing to publish to.
+/// Why the options are invalid.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum OptionError {
-    /// The broker is not written as one.
+    /// The broker's address has another format.
     Broker,
-    /// The robot's name cannot be part of a topic.
+    /// The robot's name cannot be a level of a topic.
     Name,
 }
 
@@ -90,7 +90,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_broker_is_written_with_or_without_a_port_and_a_login() {
+    fn a_broker_address_may_have_a_port_and_a_login() {
         let parse = |text: &str| text.parse::<Broker>().map(|broker| (broker.host, broker.port, broker.login));
         assert_eq!(parse("mqtt://hall"), Ok(("hall".to_owned(), 1883, None)));
         let login = Some(("a".to_owned(), "b:c@d".to_owned()));
@@ -102,7 +102,7 @@ mod tests {
     }
 
     #[test]
-    fn a_name_that_would_be_more_than_one_level_of_a_topic_is_refused() {
+    fn a_name_that_is_not_one_topic_level_is_refused() {
         let broker: Broker = "mqtt://hall".parse().unwrap();
         assert!(Options::new(broker.clone(), "robot 7").is_ok());
         for wrong in ["", "a/b", "+", "a#"] {

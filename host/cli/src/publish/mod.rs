@@ -1,20 +1,20 @@
-//! What a robot says, told to an MQTT broker (feature `mqtt`), so that any number can listen and none of them to the robot.
+//! Publishes a robot's messages to an MQTT broker (feature `mqtt`). Subscribers cannot send commands.
 //!
 //! | Topic | Holds | Retained | QoS |
 //! |---|---|---|---|
-//! | `toposlam/NAME/status` | `online` or `offline`: whether the robot can be heard here; the last will is `offline` | yes | 1 |
-//! | `toposlam/NAME/map` | the whole map as [`map_json`], when it changed and is known to be the robot's | yes | 1 |
-//! | `toposlam/NAME/events` | each message and damage as [`json::event`] | no | 0 |
-//! | `toposlam/NAME/frames` | each message as the frame it came in, when [`Options::frames`] wants them | no | 0 |
+//! | `toposlam/NAME/status` | `online` or `offline`: whether the robot is connected; the last will is `offline` | yes | 1 |
+//! | `toposlam/NAME/map` | the whole map as [`map_json`], after each change, once its digest matches the robot's | yes | 1 |
+//! | `toposlam/NAME/events` | each message and decoding error as [`json::event`] | no | 0 |
+//! | `toposlam/NAME/frames` | each message as the frame it came in, if [`Options::frames`] is set | no | 0 |
 //!
-//! The robot is heard whatever the broker does: what does not fit into a bounded queue, and what is said while the broker is
-//! away, is dropped and counted. Status and map are told again when the broker is back.
+//! The broker never delays the robot's line: messages that exceed a bounded queue, or arrive while the broker is
+//! disconnected, are dropped and counted. Status and map are published again after a reconnection.
 //!
 //! ```
 //! use toposlam_cli::publish::{Broker, Options, Publisher};
 //!
 //! let broker: Broker = "mqtt://127.0.0.1:1".parse()?;
-//! // Nobody is there, which a publisher does not mind.
+//! // No broker listens there; the publisher keeps trying.
 //! let publisher = Publisher::start(Options::new(broker, "kitchen")?, |_| ());
 //! assert_eq!(publisher.counters().published, 0);
 //! assert!("http://127.0.0.1".parse::<Broker>().is_err());
@@ -39,37 +39,36 @@ use toposlam_link::json;
 use toposlam_link::link::News;
 use toposlam_link::listener::{Event, Listener};
 
-/// How much may wait for the broker.
+/// Maximum number of queued messages.
 const QUEUE_MESSAGES: usize = 256;
-/// The broker is asked for a sign of life so often.
+/// MQTT keep-alive interval.
 const KEEP_ALIVE: Duration = Duration::from_secs(5);
-/// How long to wait before a broker that is away is tried again.
+/// Delay before the next attempt to connect.
 const RETRY: Duration = Duration::from_millis(500);
-/// How long the last words may take.
+/// Timeout of the disconnection.
 const FAREWELL: Duration = Duration::from_secs(1);
-/// More than the largest map takes as JSON.
+/// Maximum packet size; larger than any map as JSON.
 const MOST_BYTES: usize = 1 << 17;
 
-/// What happens between here and the broker.
+/// An event of the connection to the broker.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum BrokerNews {
-    /// The broker is there.
+    /// The broker has accepted the connection.
     Connected,
-    /// The broker is away, or cannot be reached. It is tried again until it can, and this is not repeated for the same
-    /// reason.
+    /// The connection failed. The publisher retries; a repeated failure for the same reason is not reported.
     Disconnected(String),
 }
 
-/// How much was told.
+/// Counts of messages.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Counters {
-    /// What was given to the broker's connection, maps and statuses included.
+    /// Messages handed to the connection, maps and statuses included.
     pub published: u64,
-    /// Events and frames that the broker did not get, because it was away or too slow.
+    /// Events and frames that were dropped because the broker was disconnected or too slow.
     pub dropped: u64,
 }
 
-/// Tells a broker what a robot says. When it is dropped the robot's status becomes `offline`.
+/// Publishes a robot's messages to a broker. Dropping it sets the robot's status to `offline`.
 pub struct Publisher {
     client: Client,
     shared: Arc<Shared>,
@@ -77,10 +76,10 @@ pub struct Publisher {
     ended: Receiver<()>,
 }
 
-/// What the publisher and the broker's thread share.
+/// State shared by the publisher and the broker's thread.
 struct Shared {
     topics: Topics,
-    /// The lock is held while its content is queued, so that the newest is queued last.
+    /// Locked while its content is queued, so that the newest is queued last.
     retained: Mutex<Retained>,
     is_connected: AtomicBool,
     is_ending: AtomicBool,
@@ -95,7 +94,7 @@ struct Topics {
     frames: String,
 }
 
-/// What the broker is to keep, and whether it has to be told.
+/// Retained messages, and whether they must be published.
 struct Retained {
     status: &'static str,
     status_due: bool,
@@ -107,13 +106,13 @@ const ONLINE: &str = "online";
 const OFFLINE: &str = "offline";
 
 impl Publisher {
-    /// Starts to look for the broker, in a thread of its own, which says through `tell` what becomes of it.
+    /// Starts a thread that connects to the broker and reports through `tell`.
     pub fn start(options: Options, tell: impl FnMut(BrokerNews) + Send + 'static) -> Self {
         let topic = |what| format!("toposlam/{}/{what}", options.robot);
         let topics =
             Topics { status: topic("status"), map: topic("map"), events: topic("events"), frames: topic("frames") };
         let Broker { host, port, login } = options.broker;
-        // A publisher that takes the place of one that hangs has its name.
+        // The client id is the robot's, so that a new publisher replaces one that hangs.
         let mut mqtt = MqttOptions::new(format!("toposlam-{}", options.robot), host, port);
         mqtt.set_keep_alive(KEEP_ALIVE).set_max_packet_size(MOST_BYTES, MOST_BYTES).set_last_will(LastWill::new(
             &topics.status,
@@ -137,13 +136,13 @@ impl Publisher {
         let far = (client.clone(), Arc::clone(&shared));
         thread::spawn(move || {
             serve(connection, &far.0, &far.1, tell);
-            // Whoever does not wait for it need not know.
+            // The receiver may already be gone.
             let _ = sender.send(());
         });
         Self { client, shared, frames: options.frames, ended }
     }
 
-    /// Takes in what happens on the robot's link. Never waits.
+    /// Processes an event of the robot's link. Never blocks.
     pub fn hear(&mut self, news: &News) {
         let mut retained = self.shared.retained();
         match news {
@@ -157,7 +156,7 @@ impl Publisher {
                 self.shared.offer(&self.client, &self.shared.topics.events, json::event(event).to_string());
                 if let (true, Event::Message(header, message)) = (self.frames, event) {
                     let mut buffer = [0; MAX_FRAME_BYTES];
-                    // A buffer of that size is always enough.
+                    // A buffer of this size is always sufficient.
                     let frame = Encoder::new(header.sequence).encode(message, &mut buffer).unwrap_or(&[]);
                     self.shared.offer(&self.client, &self.shared.topics.frames, frame);
                 }
@@ -167,7 +166,7 @@ impl Publisher {
         self.shared.settle(&self.client, &mut retained);
     }
 
-    /// How much was told so far.
+    /// The counts so far.
     pub fn counters(&self) -> Counters {
         Counters {
             published: self.shared.published.load(Ordering::Relaxed),
@@ -183,7 +182,7 @@ impl Drop for Publisher {
         self.shared.settle(&self.client, &mut retained);
         drop(retained);
         self.shared.is_ending.store(true, Ordering::Relaxed);
-        // When the queue is full the broker has the last will instead.
+        // If the queue is full, the broker publishes the last will instead.
         if self.client.try_disconnect().is_ok() && self.shared.is_connected() {
             let _ = self.ended.recv_timeout(FAREWELL);
         }
@@ -206,7 +205,7 @@ impl Retained {
 
 impl Shared {
     fn retained(&self) -> std::sync::MutexGuard<'_, Retained> {
-        // What it holds is whole at any time.
+        // Ignores poisoning: the content is always consistent.
         self.retained.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
@@ -214,14 +213,14 @@ impl Shared {
         self.is_connected.load(Ordering::Relaxed)
     }
 
-    /// Queues what may be lost.
+    /// Queues a message that may be dropped.
     fn offer(&self, client: &Client, topic: &str, payload: impl Into<Vec<u8>>) {
         let is_queued = self.is_connected() && client.try_publish(topic, QoS::AtMostOnce, false, payload).is_ok();
         let count = if is_queued { &self.published } else { &self.dropped };
         count.fetch_add(1, Ordering::Relaxed);
     }
 
-    /// Queues what the broker is to keep and does not have yet; what finds no room is tried again with the next news.
+    /// Queues retained messages that the broker does not have yet. If the queue is full, the next news retries.
     fn settle(&self, client: &Client, retained: &mut Retained) {
         if !self.is_connected() {
             return;
@@ -238,7 +237,7 @@ impl Shared {
     }
 }
 
-/// Keeps up the connection to the broker until the publisher ends.
+/// Maintains the connection to the broker until the publisher ends.
 fn serve(
     mut connection: rumqttc::Connection,
     client: &Client,
@@ -250,7 +249,7 @@ fn serve(
         match event {
             Ok(rumqttc::Event::Incoming(Packet::ConnAck(_))) => {
                 let mut retained = shared.retained();
-                // Another broker, or one that was started anew, knows nothing.
+                // A new or restarted broker has no retained messages.
                 (retained.status_due, retained.map_due) = (true, true);
                 shared.is_connected.store(true, Ordering::Relaxed);
                 shared.settle(client, &mut retained);
@@ -290,8 +289,9 @@ fn changes_map(event: Event<'_>) -> bool {
     )
 }
 
-/// A map as JSON: `vertices`, each with `vertex`, `radius_mm` and `visits`; `edges`, each a pair of vertices; `location`,
-/// `null` or the `vertex` at which the robot is and the `place_index` of when; and `digest`, the number by which the robot names the map.
+/// A map as JSON: `vertices`, each with `vertex`, `radius_mm` and `visits`; `edges`, each a pair of vertices;
+/// `location`, `null` or the robot's `vertex` and the `place_index` of its last place; and `digest`, the robot's digest
+/// of the map.
 pub fn map_json(listener: &Listener) -> Value {
     let map = listener.map();
     let vertices: Vec<Value> = (0_u8..)

@@ -1,23 +1,23 @@
-//! As much of HTTP as a page for a few browsers takes: a request's head is read, and an answer closes the connection.
+//! Minimal HTTP for a page with few browsers: reads the head of a request and closes the connection after the response.
 
 use std::io::{self, Read, Write};
 use std::net::{IpAddr, SocketAddr, TcpStream};
 use std::time::{Duration, Instant};
 
-/// A browser's head has some 1 KiB.
+/// Maximum size of a head; that of a browser has about 1 KiB.
 const MAX_HEAD_BYTES: usize = 16 * 1024;
 const MAX_HEADERS: usize = 100;
 
-/// What is wanted.
+/// A request.
 #[derive(Debug, PartialEq, Eq)]
 pub(super) struct Request {
     pub(super) method: String,
-    /// Without what stands after `?`.
+    /// Without the query string.
     pub(super) path: String,
     pub(super) host: String,
 }
 
-/// Why a request is not answered with what it wants.
+/// Why a request is refused.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Refusal {
     Malformed,
@@ -55,7 +55,7 @@ impl Refusal {
     }
 }
 
-/// Reads a request's head. `None` when the connection failed or ended, and nobody waits for an answer.
+/// Reads the head of a request. `None` if the connection fails or ends, so that no response is possible.
 pub(super) fn read(stream: &mut TcpStream, patience: Duration) -> Option<Result<Request, Refusal>> {
     let deadline = Instant::now() + patience;
     let mut head = Vec::new();
@@ -83,7 +83,7 @@ pub(super) fn read(stream: &mut TcpStream, patience: Duration) -> Option<Result<
     }
 }
 
-/// The request in a head, or `None` while that is not whole.
+/// Parses a head; `None` if it is incomplete.
 fn parse(head: &[u8]) -> Option<Result<Request, Refusal>> {
     let mut headers = [httparse::EMPTY_HEADER; MAX_HEADERS];
     let mut request = httparse::Request::new(&mut headers);
@@ -103,10 +103,10 @@ fn parse(head: &[u8]) -> Option<Result<Request, Refusal>> {
     Some(Ok(Request { method: method.to_owned(), path: path.to_owned(), host: host.to_owned() }))
 }
 
-/// Whether a request is for this server: for the address that it came in at, `localhost`, or one of the names.
+/// Whether a request is for this server: its host is the address of the connection, `localhost`, or one of the names.
 ///
-/// A page of elsewhere may have its own name resolve to this computer, and a browser then takes both for the same site. The name is
-/// all that tells such a request. The port says nothing: it may be forwarded.
+/// Prevents DNS rebinding: a foreign page can resolve its own name to this computer, and the browser then treats both
+/// as the same site. Only the host name distinguishes such a request. The port is ignored, because it may be forwarded.
 pub(super) fn is_ours(host: &str, here: IpAddr, names: &[String]) -> bool {
     let without_brackets = host.strip_prefix('[').and_then(|rest| rest.strip_suffix(']')).unwrap_or(host);
     let address = host.parse().map(|address: SocketAddr| address.ip()).or_else(|_| without_brackets.parse());
@@ -118,7 +118,7 @@ pub(super) fn is_ours(host: &str, here: IpAddr, names: &[String]) -> bool {
         || names.iter().any(|ours| name.eq_ignore_ascii_case(ours))
 }
 
-/// The head of an answer; its body ends with the connection.
+/// The head of a response; the end of the connection ends the body.
 pub(super) fn write_head(
     stream: &mut impl Write,
     status: &str,
@@ -145,7 +145,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_head_is_waited_for_until_it_is_whole() {
+    fn an_incomplete_head_is_not_parsed() {
         let whole = b"GET /map.json?x=1 HTTP/1.1\r\nUser-Agent: x\r\nhost: localhost:8080\r\n\r\n";
         for end in 0..whole.len() {
             assert_eq!(parse(&whole[..end]), None, "{end}");
@@ -165,7 +165,7 @@ mod tests {
     }
 
     #[test]
-    fn a_host_is_ours_by_the_address_it_came_in_at_or_by_a_name_we_have() {
+    fn a_host_is_accepted_by_local_address_or_configured_name() {
         let loopback: IpAddr = [127, 0, 0, 1].into();
         let mapped: IpAddr = "::ffff:127.0.0.1".parse().unwrap();
         for host in ["127.0.0.1", "127.0.0.1:8080", "localhost:8080", "LocalHost", "[::ffff:127.0.0.1]:80"] {

@@ -1,12 +1,12 @@
-//! A live view of a robot in browsers: a small web server with one page, which only shows and tells the robot nothing.
+//! Web server with a live view of a robot, read-only, on one page.
 //!
-//! | Part | Is |
+//! | Module | Purpose |
 //! |---|---|
-//! | [`state`] | what is known of a robot as JSON, from a [`Watch`] |
-//! | [`server`] | the page, the newest state, and the states as they come, for several browsers at once |
+//! | [`state`] | the state of a robot as JSON, from a [`Watch`] |
+//! | [`server`] | the page, the newest state, and a stream of states, for several browsers |
 //!
-//! A browser gets `/`, the page; `/map.json`, the newest state; and `/events`, the newest state and then each next one as
-//! server-sent events. One that is slow misses states and sees the newest next; it holds up neither the robot's line nor the others.
+//! `/` is the page, `/map.json` the newest state, and `/events` a stream of server-sent events: the newest state, then
+//! each new one. A slow browser skips states; it delays neither the robot's line nor other browsers.
 //!
 //! ```
 //! use std::io::{Read, Write};
@@ -36,10 +36,11 @@ use self::state::State;
 use toposlam_link::link::{Link, Options, Source};
 use toposlam_link::watch::Watch;
 
-/// News that may wait. When more come the line waits for this computer; it never waits for a browser.
+/// Maximum number of queued news. When the queue is full, the link waits for this thread, which never waits for a
+/// browser.
 const QUEUE: usize = 256;
 
-/// Shows the robot on a line until the standard input has ended, if that is the line; a line that is cut is opened again.
+/// Serves the state of the robot on a line. Reopens a failed line; returns only at the end of the standard input.
 ///
 /// `name` is the name of the line, `-` for the standard input; `baud` is the speed of a serial port.
 pub fn follow(name: &str, baud: u32, options: Options, server: &Server) {

@@ -1,24 +1,24 @@
-//! The newest state, shared between the one who publishes it and the browsers that wait for it.
+//! The newest state, shared between the publisher and the waiting browsers.
 
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
 use super::state::State;
 
-/// What a browser has seen last, as the numbers of both parts; 0 is nothing.
+/// The numbers of both parts that a browser received last; 0 means none.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Seen {
     map: u64,
     live: u64,
 }
 
-/// What is news for a browser.
+/// The result of waiting for a new state.
 pub(super) enum Change {
-    /// The parts that it has not seen.
+    /// The parts that the browser has not received yet.
     Parts { map: Option<Arc<str>>, live: Option<Arc<str>> },
-    /// Nothing came in the time that it wanted to wait.
+    /// Timeout without a new state.
     Nothing,
-    /// The server ends.
+    /// The server is shutting down.
     Closed,
 }
 
@@ -89,7 +89,7 @@ impl Newest {
         format!("{{\"map\":{},\"live\":{}}}", inner.map.text, inner.live.text)
     }
 
-    /// Waits for what was not seen yet.
+    /// Waits for a part that the browser has not received yet.
     pub(super) fn wait(&self, seen: &mut Seen, patience: Duration) -> Change {
         let is_old =
             |inner: &mut Inner| !inner.closed && inner.map.number == seen.map && inner.live.number == seen.live;
@@ -104,7 +104,7 @@ impl Newest {
         Change::Parts { map: inner.map.unless_seen(&mut seen.map), live: inner.live.unless_seen(&mut seen.live) }
     }
 
-    /// Nobody panics with the lock in hand in the middle of a change, so what is there is whole.
+    /// Ignores poisoning: no change can panic halfway, so the state is always consistent.
     fn lock(&self) -> MutexGuard<'_, Inner> {
         self.inner.lock().unwrap_or_else(PoisonError::into_inner)
     }

@@ -1,4 +1,4 @@
-//! The web server: one page, the newest state, and the states as they come, for several browsers at once.
+//! Web server for several browsers: one page, the newest state, and a stream of states.
 
 use std::io::{self, Write};
 use std::net::{IpAddr, Ipv4Addr, Ipv6Addr, SocketAddr, TcpListener, TcpStream};
@@ -13,21 +13,21 @@ use super::state::State;
 
 const PAGE: &str = include_str!("page.html");
 
-/// What the system keeps for a browser that does not read, beside what the browser's own system keeps.
+/// Send buffer of the operating system for a browser that does not read, in addition to the browser's receive buffer.
 const SEND_BUFFER_BYTES: usize = 64 * 1024;
 
-/// How a server treats browsers.
+/// Limits of a server.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Options {
-    /// Names of this computer that browsers may call it by, beside its addresses and `localhost`.
+    /// Host names that browsers may use besides the addresses of this computer and `localhost`.
     pub names: Vec<String>,
-    /// How many connections there may be at once; further ones are refused.
+    /// Maximum number of connections; further ones are refused.
     pub connections: usize,
-    /// A browser that takes so long to send a request, or to take anything of what is sent to it, is dropped.
+    /// Timeout of a request, and of each write to a browser. Then the browser is dropped.
     pub patience: Duration,
-    /// The shortest time between two states for the same browser.
+    /// Minimum interval between two states for the same browser.
     pub pace: Duration,
-    /// When there is no new state for so long, a comment is sent, so that a browser that has gone is noticed.
+    /// Without a new state for this long, the server sends a comment, which detects browsers that have disconnected.
     pub keep_alive: Duration,
 }
 
@@ -43,7 +43,7 @@ impl Default for Options {
     }
 }
 
-/// A server, until it is dropped.
+/// A web server that runs until it is dropped.
 pub struct Server {
     address: SocketAddr,
     shared: Arc<Shared>,
@@ -57,11 +57,11 @@ struct Shared {
 }
 
 impl Server {
-    /// Serves at an address, `HOST:PORT`; port 0 is any free one. `state` is what browsers see until the first
+    /// Serves at an address, `HOST:PORT`; port 0 selects any free port. Browsers get `state` until the first
     /// [`Server::publish`].
     ///
     /// # Errors
-    /// When the address is not this computer's, or taken.
+    /// If the address is not one of this computer, or is in use.
     pub fn bind(address: &str, options: Options, state: &State) -> io::Result<Self> {
         let listener = TcpListener::bind(address)?;
         let address = listener.local_addr()?;
@@ -73,17 +73,17 @@ impl Server {
         Ok(Self { address, shared, accepting: Some(accepting) })
     }
 
-    /// The address that it serves at.
+    /// The address of the listening socket.
     pub const fn address(&self) -> SocketAddr {
         self.address
     }
 
-    /// Shows a state from now on. Never waits for a browser.
+    /// Replaces the newest state. Never waits for a browser.
     pub fn publish(&self, state: &State) {
         self.shared.newest.publish(state);
     }
 
-    /// How many connections there are.
+    /// Number of open connections.
     pub fn connections(&self) -> usize {
         self.shared.connections.load(Ordering::Relaxed)
     }
@@ -92,7 +92,7 @@ impl Server {
 impl Drop for Server {
     fn drop(&mut self) {
         self.shared.newest.close();
-        // The one who accepts sleeps until someone connects.
+        // A connection wakes the thread that blocks in `accept`.
         let ip = match self.address.ip() {
             IpAddr::V4(ip) if ip.is_unspecified() => Ipv4Addr::LOCALHOST.into(),
             IpAddr::V6(ip) if ip.is_unspecified() => Ipv6Addr::LOCALHOST.into(),
@@ -112,20 +112,20 @@ fn accept(listener: &TcpListener, shared: &Arc<Shared>) {
             return;
         }
         let Ok((stream, _)) = accepted else {
-            // There are no more connections to be had at the moment, and the next attempt would fail as fast.
+            // The process has no free sockets; an immediate retry would fail as well.
             thread::sleep(Duration::from_millis(50));
             continue;
         };
         let place = Place::take(shared);
-        // Without a thread the connection is closed.
+        // If no thread can be started, the connection is closed.
         let _ = thread::Builder::new().spawn(move || {
-            // Whoever went away needs no answer.
+            // A browser that has disconnected needs no response.
             let _ = place.answer(stream);
         });
     }
 }
 
-/// A connection's place among those that may be.
+/// One of the limited number of connections.
 struct Place {
     shared: Arc<Shared>,
     is_free: bool,
@@ -177,7 +177,7 @@ impl Place {
         if wants_body { stream.write_all(body.as_bytes()) } else { Ok(()) }
     }
 
-    /// Sends the newest state and then each next one, until the browser goes, is too slow, or the server ends.
+    /// Sends the newest state and then each new one, until the browser disconnects or is too slow, or the server ends.
     fn stream(&self, stream: &mut TcpStream) -> io::Result<()> {
         let Options { pace, keep_alive, .. } = self.shared.options;
         let mut seen = Seen::default();
@@ -205,7 +205,7 @@ impl Drop for Place {
     }
 }
 
-/// The page, whose script and style alone the browser is to run: they carry a number that nobody else can know.
+/// The page. The browser runs only its script and style, which carry a random nonce.
 fn page(stream: &mut TcpStream) -> io::Result<String> {
     let nonce = format!("{:032x}", rand::random::<u128>());
     let policy = format!(

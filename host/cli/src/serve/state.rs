@@ -1,4 +1,4 @@
-//! What is known of a robot as JSON, in two parts: what a place changes, and what each ring frame changes.
+//! State of a robot as JSON, in two parts: one changes with each place, the other with each ring frame.
 //!
 //! ```
 //! use toposlam_cli::serve::state::State;
@@ -18,22 +18,23 @@ use toposlam_link::listener::{Listener, Understanding};
 use toposlam_link::watch::{Connection, Watch};
 use toposlam_link::{event_text, json};
 
-/// Both parts.
+/// Both parts of the state.
 #[derive(Clone, Debug, PartialEq)]
 pub struct State {
-    /// The line and whether it is open, the map where the layout draws it, where the robot may be, why it believes so, the status of its goal, and
-    /// its faults.
+    /// The line and its connection, the map with its layout, the robot's possible vertices and the evidence for them,
+    /// the status of its goal, and its faults.
     ///
-    /// Distances are in millimetres, `null` when they are infinite; `x` and `y` count edges, `y` points up. What was not heard is `null`.
+    /// Distances are in millimetres, `null` if infinite; `x` and `y` are in edge lengths, `y` points up. Values not yet
+    /// received are `null`.
     pub map: Value,
-    /// The newest ring frame, what the drive does, and how well the robot is heard.
+    /// The newest ring frame, the state of the drive, and the counters of the line.
     ///
-    /// `damaged` counts pieces of the line that were no whole frame, `unknown` whole frames that mean nothing here.
+    /// `damaged` counts frames that failed to decode, `unknown` intact frames of an unknown version or message.
     pub live: Value,
 }
 
 impl State {
-    /// All that is known. Arranges the map.
+    /// The current state. Arranges the map.
     pub fn of(watch: &mut Watch) -> Self {
         watch.arrange();
         Self { map: map(watch), live: live(watch.listener()) }
@@ -140,7 +141,7 @@ fn finite_mm(distance_mm: u16) -> Option<u16> {
     (distance_mm != u16::MAX).then_some(distance_mm)
 }
 
-/// Rounded: nobody sees more of it, and it is sent often.
+/// Rounded, because the state is sent often and more digits are not visible.
 fn thousandths(value: f64) -> f64 {
     (value * 1000.0).round() / 1000.0
 }

@@ -1,4 +1,4 @@
-//! The server as a browser meets it, with a simulated robot at the other end of the line.
+//! The server as seen by a browser, with a simulated robot on the line.
 
 use std::io::{BufRead, BufReader, Read, Write};
 use std::net::{SocketAddr, TcpStream};
@@ -24,7 +24,7 @@ use toposlam_link::watch::Watch;
 use toposlam_sim::exploration::Exploration;
 use toposlam_sim::world::{Plan, RobotModel};
 
-/// Longer than anything takes; who waits so long has failed.
+/// Timeout of every wait in these tests.
 const FOREVER: Duration = Duration::from_secs(60);
 
 fn server(options: Options) -> Server {
@@ -41,7 +41,7 @@ fn connect(address: SocketAddr) -> TcpStream {
     stream
 }
 
-/// The head and the body of the answer to some bytes.
+/// The head and the body of the response to the given bytes.
 fn answer(server: &Server, request: &str) -> (String, String) {
     let mut stream = connect(server.address());
     stream.write_all(request.as_bytes()).unwrap();
@@ -55,7 +55,7 @@ fn get(server: &Server, path: &str) -> (String, String) {
     answer(server, &format!("GET {path} HTTP/1.1\r\nHost: {}\r\n\r\n", server.address()))
 }
 
-/// A browser's ear: the name, the data and the length in bytes of each event.
+/// Client of the event stream: the name, data and length in bytes of each event.
 struct Events(BufReader<TcpStream>);
 
 impl Events {
@@ -95,7 +95,7 @@ impl Iterator for Events {
 }
 
 #[test]
-fn the_page_is_whole_and_runs_nothing_but_itself() {
+fn the_page_is_self_contained_and_loads_no_other_resource() {
     let server = server(Options::default());
     let (head, page) = get(&server, "/");
     assert!(head.starts_with("HTTP/1.1 200 OK\r\n") && head.contains("text/html; charset=utf-8"), "{head}");
@@ -108,11 +108,11 @@ fn the_page_is_whole_and_runs_nothing_but_itself() {
     for elsewhere in ["src=", "@import", "url(", "https:", "//cdn"] {
         assert!(!page.contains(elsewhere), "{elsewhere}");
     }
-    assert_ne!(get(&server, "/").1, page, "the nonce is another one each time");
+    assert_ne!(get(&server, "/").1, page, "each response has a new nonce");
 }
 
 #[test]
-fn what_is_not_there_or_not_for_us_is_refused() {
+fn unknown_paths_methods_and_hosts_are_refused() {
     let quick = Options { patience: Duration::from_millis(100), names: vec!["robot.lan".into()], ..Options::default() };
     let server = server(quick);
     let head = |request: &str| answer(&server, request).0;
@@ -133,7 +133,7 @@ fn what_is_not_there_or_not_for_us_is_refused() {
 }
 
 #[test]
-fn two_browsers_see_the_robots_map_and_the_newest_state_is_the_same() {
+fn two_browsers_and_map_json_show_the_same_map() {
     let mut robot = Broadcast::bind("127.0.0.1:0").unwrap();
     let line = format!("tcp:{}", robot.address().unwrap());
     let server = Arc::new(Server::bind("127.0.0.1:0", Options::default(), &State::of(&mut Watch::new(&line))).unwrap());
@@ -153,7 +153,7 @@ fn two_browsers_see_the_robots_map_and_the_newest_state_is_the_same() {
         exploration.advance();
         robot.exchange(&exploration.board().sent);
     }
-    // It stands still from here on and goes on telling its map.
+    // From here on the robot stands still and keeps sending its map.
     exploration.command(Command::Pause { on: true });
     let deadline = Instant::now() + FOREVER;
     let mut seen = vec![Value::Null; maps.len()];
@@ -181,7 +181,7 @@ fn two_browsers_see_the_robots_map_and_the_newest_state_is_the_same() {
             assert!(robots.vertices.len() >= 2 && !robots.edges.is_empty());
             break;
         }
-        assert!(Instant::now() < deadline, "{robots:?}, but seen was {seen:?}");
+        assert!(Instant::now() < deadline, "{robots:?}, received: {seen:?}");
     }
     let newest: Value = serde_json::from_str(&get(&server, "/map.json").1).unwrap();
     assert_eq!(newest["map"]["edges"], seen[0]["edges"]);
@@ -192,11 +192,11 @@ fn two_browsers_see_the_robots_map_and_the_newest_state_is_the_same() {
     drop(robot);
     for maps in &maps {
         let cut = maps.iter().find(|map| map["connection"]["state"] == "cut").unwrap();
-        assert!(cut["connection"]["reason"].is_string() && cut["edges"] == seen[0]["edges"], "what was heard stays");
+        assert!(cut["connection"]["reason"].is_string() && cut["edges"] == seen[0]["edges"], "the map is kept");
     }
 }
 
-/// The maps that a browser sees.
+/// The maps that a browser receives.
 fn maps_of(address: SocketAddr) -> Receiver<Value> {
     let (sender, maps) = channel();
     thread::spawn(move || {
@@ -210,7 +210,7 @@ fn maps_of(address: SocketAddr) -> Receiver<Value> {
 }
 
 #[test]
-fn a_browser_that_comes_late_gets_the_newest_state_first_and_one_that_lags_skips_to_it() {
+fn late_and_slow_browsers_get_the_newest_state() {
     let server = server(Options { pace: Duration::ZERO, patience: FOREVER, ..Options::default() });
     server.publish(&numbered(1));
     let (early, address) = (with_little_room(server.address()), server.address());
@@ -220,12 +220,12 @@ fn a_browser_that_comes_late_gets_the_newest_state_first_and_one_that_lags_skips
     (2..=states).for_each(|number| server.publish(&numbered(number)));
     assert_eq!(Events::of(address).live_numbers().next(), Some(states.into()), "the newest state comes first");
     let lagged: Vec<u64> = early.take_while(|&number| number < u64::from(states)).collect();
-    assert!(lagged.len() < 50_000, "{} states were kept for it", lagged.len());
+    assert!(lagged.len() < 50_000, "{} states were queued for it", lagged.len());
     assert!(lagged.is_sorted());
 }
 
 #[test]
-fn a_browser_that_takes_nothing_is_dropped_and_holds_nobody_up() {
+fn a_browser_that_does_not_read_is_dropped_and_blocks_nobody() {
     let server = server(Options { pace: Duration::ZERO, patience: Duration::from_millis(200), ..Options::default() });
     let mut stuck = with_little_room(server.address());
     write!(stuck, "GET /events HTTP/1.1\r\nHost: localhost\r\n\r\n").unwrap();
@@ -242,10 +242,10 @@ fn a_browser_that_takes_nothing_is_dropped_and_holds_nobody_up() {
         thread::sleep(Duration::from_millis(1));
         assert!(Instant::now() < deadline, "{} connections after {published} states", server.connections());
     }
-    assert!(numbers.iter().any(|number| number == u64::from(published)), "the other one sees all that is newest");
+    assert!(numbers.iter().any(|number| number == u64::from(published)), "the other browser receives the newest state");
 }
 
-/// A connection on which little waits to be read.
+/// A connection with a small receive buffer.
 fn with_little_room(address: SocketAddr) -> TcpStream {
     let socket = socket2::Socket::new(socket2::Domain::IPV4, socket2::Type::STREAM, None).unwrap();
     socket.set_recv_buffer_size(8192).unwrap();
@@ -255,7 +255,7 @@ fn with_little_room(address: SocketAddr) -> TcpStream {
 }
 
 #[test]
-fn more_browsers_than_there_is_room_for_are_refused_and_the_end_of_the_server_ends_their_streams() {
+fn excess_browsers_are_refused_and_dropping_the_server_ends_all_streams() {
     let server = server(Options { connections: 1, ..Options::default() });
     let mut only = Events::of(server.address());
     assert_eq!(only.by_ref().take(2).filter(|(name, ..)| name == "live").count(), 1);
@@ -264,7 +264,7 @@ fn more_browsers_than_there_is_room_for_are_refused_and_the_end_of_the_server_en
     let address = server.address();
     drop(server);
     assert_eq!(only.next(), None);
-    assert!(TcpStream::connect(address).is_err(), "nobody serves there any more");
+    assert!(TcpStream::connect(address).is_err(), "the server no longer accepts connections");
 }
 
 fn hear(watch: &mut Watch, messages: &[Message]) {
@@ -279,7 +279,7 @@ fn hear(watch: &mut Watch, messages: &[Message]) {
 }
 
 #[test]
-fn a_robot_of_another_version_is_told_from_one_that_means_other_things() {
+fn another_version_is_distinguished_from_another_schema() {
     let capacities =
         Capacities { vertices: 16, hypotheses: 10, history: 400, ngram_length: 5, fingerprint_step_mm: 2, sonars: 16 };
     let hello = Hello::new(1, ResetCause::PowerOn, 1, capacities);
@@ -297,7 +297,7 @@ fn a_robot_of_another_version_is_told_from_one_that_means_other_things() {
 }
 
 #[test]
-fn a_ring_frame_is_live_and_leaves_the_map_as_it_was() {
+fn a_ring_frame_changes_the_live_part_only() {
     let mut watch = Watch::new("line");
     let before = State::of(&mut watch);
     let echoes = Echoes::new(&[Echo::Range { range_mm: 1482 }, Echo::Silence, Echo::Dead]);
@@ -308,7 +308,7 @@ fn a_ring_frame_is_live_and_leaves_the_map_as_it_was() {
 }
 
 #[test]
-fn a_vertex_keeps_its_position_under_its_new_number() {
+fn a_renumbered_vertex_keeps_its_position() {
     let edge = |a, b| Message::Edge { a, b, present: true };
     let positions = |watch: &mut Watch| -> Vec<(f64, f64)> {
         let map = State::of(watch).map;
@@ -326,11 +326,11 @@ fn a_vertex_keeps_its_position_under_its_new_number() {
     assert_eq!(positions(&mut after), expected);
 }
 
-/// How long a ring frame takes from the robot's line to a browser, and how many bytes that is:
+/// Measures the latency and the size of a ring frame from the robot's line to a browser:
 /// `cargo test -p toposlam-cli --lib serve::tests::measure -- --ignored --nocapture`.
 #[test]
 #[ignore = "a measurement of a minute"]
-fn measure_the_way_from_the_robot_to_a_browser() {
+fn measure_the_latency_from_the_robot_to_a_browser() {
     const FRAMES: u32 = 600;
     let mut robot = Broadcast::bind("127.0.0.1:0").unwrap();
     let line = format!("tcp:{}", robot.address().unwrap());

@@ -1,4 +1,4 @@
-//! `toposlam monitor` before `toposlam robot`: as lines, and on a pseudo terminal.
+//! `toposlam monitor` with `toposlam robot`: headless, and in a pseudo terminal.
 
 mod terminal;
 
@@ -18,7 +18,7 @@ use super::{complaint, printed, toposlam};
 
 const TOPOSLAM: &str = env!("CARGO_BIN_EXE_toposlam");
 
-/// `toposlam robot`, until it is dropped.
+/// `toposlam robot`, which runs until it is dropped.
 struct Robot {
     process: Child,
     line: String,
@@ -49,7 +49,7 @@ impl Drop for Robot {
     }
 }
 
-/// What a robot says until it has found so many places.
+/// The stream of a robot until it has detected the given number of places.
 fn recording(places: usize) -> Vec<u8> {
     let plan = Plan::built_in("ring").unwrap();
     let mut buffer = [0; SNAPSHOT_BYTES];
@@ -63,7 +63,7 @@ fn recording(places: usize) -> Vec<u8> {
 }
 
 #[test]
-fn headless_json_is_an_object_a_line_and_ends_after_so_many_events() {
+fn headless_json_prints_an_object_per_line_and_stops_at_the_event_limit() {
     let robot = Robot::at("127.0.0.1:0");
     let text = printed(&toposlam(&["monitor", &robot.line, "--headless", "--json", "--events", "100"]));
     let events: Vec<Value> = text.lines().map(|line| serde_json::from_str(line).unwrap()).collect();
@@ -74,7 +74,7 @@ fn headless_json_is_an_object_a_line_and_ends_after_so_many_events() {
 }
 
 #[test]
-fn headless_on_the_standard_input_tells_a_recording_to_its_end() {
+fn headless_reads_the_standard_input_to_its_end() {
     let mut monitor = Command::new(TOPOSLAM)
         .args(["monitor", "-", "--headless"])
         .stdin(Stdio::piped())
@@ -92,8 +92,8 @@ fn headless_on_the_standard_input_tells_a_recording_to_its_end() {
 }
 
 #[test]
-fn headless_fails_when_nothing_came_in_time_and_the_screen_without_a_terminal() {
-    // Port 1 of this computer has no robot.
+fn headless_fails_after_a_timeout_and_the_screen_without_a_terminal() {
+    // No robot listens at port 1 of this computer.
     let alone = ["monitor", "tcp:127.0.0.1:1", "--headless", "--json", "--seconds", "0.1"];
     let output = toposlam(&alone);
     assert!(complaint(&output).contains("0 of 1 events"));
@@ -103,7 +103,7 @@ fn headless_fails_when_nothing_came_in_time_and_the_screen_without_a_terminal() 
 }
 
 #[test]
-fn the_screen_shows_a_robot_takes_keys_finds_it_again_and_gives_the_terminal_back() {
+fn the_screen_shows_a_robot_reconnects_and_restores_the_terminal() {
     let robot = Robot::at("127.0.0.1:0");
     let Some(mut terminal) = PseudoTerminal::running(&format!("{TOPOSLAM} monitor {}", robot.line)) else { return };
     for text in ["connected", "its rivals", "at vertex", "as the robot has it"] {
@@ -128,7 +128,7 @@ fn the_screen_shows_a_robot_takes_keys_finds_it_again_and_gives_the_terminal_bac
 }
 
 #[test]
-fn control_c_and_signals_give_the_terminal_back() {
+fn control_c_and_signals_restore_the_terminal() {
     let nobody = format!("{TOPOSLAM} monitor tcp:127.0.0.1:1");
     let Some(mut terminal) = PseudoTerminal::running(&nobody) else { return };
     terminal.wait_for("trying again");
@@ -162,7 +162,7 @@ fn keys_come_from_the_terminal_when_the_robot_is_the_standard_input() {
 }
 
 #[test]
-fn a_panic_gives_the_terminal_back_and_is_readable() {
+fn a_panic_restores_the_terminal_and_is_readable() {
     let this = std::env::current_exe().unwrap();
     let name = "monitor::panics_on_the_screen";
     let command = format!("{} --ignored --exact --nocapture {name}", this.display());

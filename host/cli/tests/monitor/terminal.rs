@@ -1,4 +1,4 @@
-//! A pseudo terminal by `script` of util-linux, with a program in it, and what is on its screen.
+//! A pseudo terminal from `script` of util-linux that runs a program, and the text on its screen.
 
 use std::io::{Read, Write};
 use std::process::{Child, ChildStdin, Command, Stdio};
@@ -8,7 +8,7 @@ use std::time::{Duration, Instant};
 
 const ROWS: u16 = 36;
 const COLUMNS: u16 = 120;
-/// What does not come in this time never will.
+/// Timeout of every wait in these tests.
 const PATIENCE: Duration = Duration::from_secs(120);
 
 pub(super) struct PseudoTerminal {
@@ -19,7 +19,7 @@ pub(super) struct PseudoTerminal {
 }
 
 impl PseudoTerminal {
-    /// A terminal in which a shell runs a command; `None`, loudly, where there is no `script`.
+    /// Runs a shell command in a terminal; `None`, with a message, if `script` is missing.
     pub(super) fn running(command: &str) -> Option<Self> {
         let version = Command::new("script").arg("--version").output();
         if !version.is_ok_and(|output| String::from_utf8_lossy(&output.stdout).contains("util-linux")) {
@@ -57,7 +57,7 @@ impl PseudoTerminal {
         self.wait_until(text, |screen| screen.contains(text));
     }
 
-    /// Waits until the screen is as is wanted.
+    /// Waits until the screen satisfies a condition.
     pub(super) fn wait_until(&mut self, what: &str, is_so: impl Fn(&str) -> bool) {
         let deadline = Instant::now() + PATIENCE;
         while !is_so(&self.text()) {
@@ -74,17 +74,17 @@ impl PseudoTerminal {
         self.keys.flush().unwrap();
     }
 
-    /// What is on the screen.
+    /// The text on the screen.
     pub(super) fn text(&self) -> String {
         self.parser.screen().contents()
     }
 
-    /// Whether a program has the screen for itself.
+    /// Whether a program uses the alternate screen.
     pub(super) fn is_taken(&self) -> bool {
         self.parser.screen().alternate_screen() && self.parser.screen().hide_cursor()
     }
 
-    /// Waits until the command ends; the screen, the cursor and the modes must be as they were. Gives its exit code.
+    /// Waits until the command ends and returns its exit code. Screen, cursor and modes must be restored.
     pub(super) fn end(mut self) -> Option<i32> {
         while let Ok(bytes) = self.bytes.recv_timeout(PATIENCE) {
             self.parser.process(&bytes);

@@ -1,4 +1,4 @@
-//! DOT, for Graphviz. `neato -n` takes the positions as they are, `dot` and the others lay the graph out anew.
+//! DOT, for Graphviz. `neato -n` uses the given positions; `dot` and other engines compute their own layout.
 
 use petgraph::dot::{Config, Dot};
 use petgraph::graph::{NodeIndex, UnGraph};
@@ -6,11 +6,11 @@ use petgraph::graph::{NodeIndex, UnGraph};
 use crate::layout::Point;
 use crate::topology::{TopologicalMap, Vertex};
 
-/// Graphviz measures positions in points, 72 to the inch; an edge is about this long.
+/// Approximate length of an edge, in Graphviz points (72 per inch).
 const POINTS_PER_EDGE: f64 = 144.0;
 
-/// The map as an undirected DOT graph: nodes `0`, `1`, … with `label`, `radius_mm`, `visits` and `pos`. Where the robot is the rim is
-/// double.
+/// The map as an undirected DOT graph: nodes `0`, `1`, … with `label`, `radius_mm`, `visits` and `pos`. The robot's
+/// vertex has a double rim.
 pub fn dot(map: &TopologicalMap, points: &[Point], here: Option<u8>) -> String {
     let graph = map.to_petgraph();
     let node = |_: &UnGraph<Vertex, ()>, (node, vertex): (NodeIndex, &Vertex)| {
@@ -41,7 +41,7 @@ mod tests {
     use crate::export::sample;
 
     #[test]
-    fn every_vertex_has_its_place_and_every_edge_its_ends() {
+    fn dot_has_every_vertex_with_its_position_and_every_edge() {
         let (map, points) = sample::map();
         let text = dot(&map, &points, Some(2));
         assert!(text.starts_with("graph {"), "{text}");

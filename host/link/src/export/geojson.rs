@@ -1,20 +1,21 @@
-//! GeoJSON in the shape of a route graph of Nav2, the navigation of ROS 2: a point for each vertex, a line for each way of each edge.
+//! GeoJSON in the format of a Nav2 (ROS 2) route graph: a point for each vertex, and a line for each direction of each
+//! edge.
 
 use serde_json::{Value, json};
 
 use crate::layout::Point;
 use crate::topology::TopologicalMap;
 
-/// The map as a `FeatureCollection` that the route server of Nav2 loads.
+/// The map as a `FeatureCollection` that Nav2's route server can load.
 ///
-/// Points have `id` and `frame`, lines `id`, `startid` and `endid`; no two features have the same `id`, which Nav2 demands. What is known
-/// of a vertex is in its `metadata`: `radius_m`, `visits`, `robot_is_here` and `has_self_loop`. A self-loop is no line, as
-/// it leads nowhere. The coordinates are the picture's, in metres when an edge is about `edge_m` long: a drawing, not positions in a
-/// building.
+/// Points have `id` and `frame`; lines have `id`, `startid` and `endid`. Every feature has a unique `id`, as Nav2
+/// requires. The `metadata` of a vertex is `radius_m`, `visits`, `robot_is_here` and `has_self_loop`. Self-loops are
+/// not exported as lines. The coordinates are those of the drawing, in metres, with edges about `edge_m` long; they are
+/// not positions in the building.
 pub fn geojson(map: &TopologicalMap, points: &[Point], here: Option<u8>, edge_m: f64) -> String {
     let position = |vertex: u8| {
         let point = points.get(usize::from(vertex)).copied().unwrap_or_default();
-        // To the millimetre.
+        // Rounded to the millimetre.
         json!([point.x, point.y].map(|unit| (unit * edge_m * 1000.0).round() / 1000.0))
     };
     let nodes = (0..).zip(&map.vertices).map(|(vertex, label)| {
@@ -38,7 +39,7 @@ pub fn geojson(map: &TopologicalMap, points: &[Point], here: Option<u8>, edge_m:
     let collection = json!({
         "type": "FeatureCollection",
         "name": "graph",
-        // As in Nav2's own files; its server takes the coordinates as metres of the frame.
+        // As in Nav2's own files: the route server reads the coordinates as metres in this frame.
         "crs": {"type": "name", "properties": {"name": "urn:ogc:def:crs:EPSG::3857"}},
         "features": nodes.chain(lines).collect::<Vec<_>>(),
     });
@@ -56,7 +57,7 @@ mod tests {
     use std::collections::BTreeSet;
 
     #[test]
-    fn every_edge_is_a_line_each_way_between_points_and_all_have_numbers_of_their_own() {
+    fn geojson_has_two_lines_per_edge_and_unique_ids() {
         let (map, points) = sample::map();
         let collection: Value = serde_json::from_str(&geojson(&map, &points, Some(3), 5.0)).unwrap();
         let features = collection["features"].as_array().unwrap();

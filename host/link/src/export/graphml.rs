@@ -1,16 +1,16 @@
-//! GraphML, for networkx, yEd, Gephi and others. Written by hand: the crates for it know no types of attributes but text.
+//! GraphML, for networkx, yEd, Gephi and others. Written by hand: the GraphML crates support only text attributes.
 
 use std::fmt::Write;
 
 use crate::layout::Point;
 use crate::topology::TopologicalMap;
 
-/// The attributes of the nodes, with their types.
+/// Attributes of the nodes and their types.
 const KEYS: [(&str, &str); 5] =
     [("radius_mm", "int"), ("visits", "long"), ("x", "double"), ("y", "double"), ("robot_is_here", "boolean")];
 
-/// The map as GraphML: an undirected graph whose nodes `0`, `1`, … have the attributes `radius_mm`, `visits`, `x` and `y`, and
-/// `robot_is_here`.
+/// The map as GraphML: an undirected graph with nodes `0`, `1`, … and their attributes `radius_mm`, `visits`, `x`, `y`
+/// and `robot_is_here`.
 pub fn graphml(map: &TopologicalMap, points: &[Point], here: Option<u8>) -> String {
     let mut text = String::from(
         "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n<graphml xmlns=\"http://graphml.graphdrawing.org/xmlns\">\n",
@@ -46,7 +46,7 @@ mod tests {
     use crate::export::sample;
 
     #[test]
-    fn every_vertex_has_its_label_and_every_edge_its_ends() {
+    fn graphml_has_every_vertex_with_its_label_and_every_edge() {
         let (map, points) = sample::map();
         let text = graphml(&map, &points, Some(2));
         assert_eq!((text.matches("<node ").count(), text.matches("<edge ").count()), (4, 5));

@@ -1,12 +1,12 @@
-//! JSON of this project's own, for scripts. `docs/map.schema.json` is its JSON Schema.
+//! JSON in this project's own format, for scripts. `docs/map.schema.json` is its JSON Schema.
 
 use serde_json::{Value, json};
 
 use crate::layout::Point;
 use crate::topology::TopologicalMap;
 
-/// The map as a JSON object: `vertices` with `vertex`, `radius_mm`, `visits`, `x` and `y`; `edges` as pairs of vertices; and `location`, the
-/// vertex where the robot is, or null.
+/// The map as a JSON object: `vertices` with `vertex`, `radius_mm`, `visits`, `x` and `y`; `edges` as pairs of
+/// vertices; and `location`, the robot's vertex or null.
 pub fn json(map: &TopologicalMap, points: &[Point], here: Option<u8>) -> String {
     let vertices = map.vertices.iter().zip(points).enumerate().map(|(vertex, (label, point))| {
         json!({"vertex": vertex, "radius_mm": label.radius_mm, "visits": label.visits, "x": point.x, "y": point.y})
@@ -27,7 +27,7 @@ mod tests {
     use crate::export::sample;
 
     #[test]
-    fn the_map_is_in_it_whole() {
+    fn json_has_every_vertex_and_every_edge() {
         let (map, points) = sample::map();
         let object: Value = serde_json::from_str(&json(&map, &points, None)).unwrap();
         assert_eq!(object["edges"], json!([[0, 1], [0, 2], [1, 2], [2, 3], [3, 3]]));

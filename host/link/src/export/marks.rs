@@ -1,28 +1,28 @@
-//! The vertices and edges of a map as parts of an SVG document, whatever is drawn beneath them. One unit of the document is 1 mm.
+//! Vertices and edges of a map as SVG elements, for any background. One unit of the document is 1 mm.
 
 use svg::node::element::{Circle, Group, Line, Text};
 
-/// The colour of a map.
+/// Colour of the map.
 pub const MAP_COLOUR: &str = "#b3261e";
-/// The colour of the robot.
+/// Colour of the robot.
 pub const ROBOT_COLOUR: &str = "#0b57d0";
-/// The radius of a vertex.
+/// Radius of a vertex.
 pub const DOT_MM: f64 = 330.0;
 
 /// A vertex in the document, whose y axis points down.
 #[derive(Clone, Debug)]
 pub struct Mark {
-    /// Where its middle is.
+    /// Position of the centre.
     pub at: (f64, f64),
-    /// The radius of its fingerprint.
+    /// Radius of its fingerprint.
     pub radius_mm: f64,
-    /// What is written on it.
+    /// Text on the vertex.
     pub name: String,
-    /// Whether the robot is there.
+    /// Whether the robot is at this vertex.
     pub is_here: bool,
 }
 
-/// The edges, as indices of vertices; one from a vertex to itself is a circle, and one that names no vertex is left out.
+/// Draws the edges, given as indices of vertices. A self-loop is a circle; an edge to an unknown vertex is omitted.
 pub fn edges(marks: &[Mark], edges: &[(usize, usize)]) -> Group {
     let mut group = Group::new().set("fill", "none").set("stroke", MAP_COLOUR).set("stroke-width", 90);
     for &(from, to) in edges {
@@ -39,7 +39,7 @@ pub fn edges(marks: &[Mark], edges: &[(usize, usize)]) -> Group {
     group
 }
 
-/// The direction from a vertex in the middle of the widest gap between its edges; up when it has none.
+/// Direction of the bisector of the widest gap between a vertex's edges; up if it has none.
 fn widest_gap(marks: &[Mark], edges: &[(usize, usize)], vertex: usize) -> f64 {
     let ends = edges.iter().filter_map(|&(a, b)| match (a == vertex, b == vertex) {
         (true, false) => marks.get(b),
@@ -55,7 +55,7 @@ fn widest_gap(marks: &[Mark], edges: &[(usize, usize)], vertex: usize) -> f64 {
     gap.map_or(first, |gap| 0.5 * (gap[0] + gap[1]))
 }
 
-/// The vertices, each with its name and radius.
+/// Draws the vertices, each with its text and radius.
 pub fn dots(marks: &[Mark]) -> Group {
     let mut group = Group::new().set("text-anchor", "middle");
     for mark in marks {
@@ -69,7 +69,7 @@ pub fn dots(marks: &[Mark]) -> Group {
         group = group
             .add(dot)
             .add(words(&mark.name, x, y + 130.0, 380.0).set("fill", "white"))
-            // A white rim keeps the words legible over the edges.
+            // A white outline keeps the text legible over the edges.
             .add(radius.set("stroke", "white").set("stroke-width", 90).set("paint-order", "stroke"));
     }
     group
@@ -85,7 +85,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_loop_is_where_no_edge_is() {
+    fn a_self_loop_lies_in_the_widest_gap_between_edges() {
         let mark = |x, y| Mark { at: (x, y), radius_mm: 1.0, name: String::new(), is_here: false };
         let marks = [mark(0.0, 0.0), mark(9.0, 0.0), mark(0.0, 9.0), mark(0.0, -9.0)];
         let gap = widest_gap(&marks, &[(0, 0), (0, 1), (0, 2), (0, 3)], 0);

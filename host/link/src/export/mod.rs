@@ -1,7 +1,8 @@
-//! A map in the formats of other programs: GraphML, DOT, GeoJSON, JSON and SVG, each a string.
+//! Export of a map to GraphML, DOT, GeoJSON, JSON and SVG, each as a string.
 //!
-//! All take a map, the position of each of its vertices in a picture ([`Layout`](crate::layout::Layout)), and the vertex where the robot
-//! is, if that is known. The positions are a drawing: a topological map has no coordinates. `docs/export.md` describes the formats.
+//! Each function takes a map, the position of each vertex in a drawing ([`Layout`](crate::layout::Layout)), and the
+//! robot's vertex if it is known. The positions are only a drawing: a topological map has no coordinates.
+//! `docs/export.md` describes the formats.
 //!
 //! ```
 //! use toposlam_link::export;
@@ -30,7 +31,7 @@ pub(crate) mod sample {
     use crate::layout::{Layout, Point};
     use crate::topology::{TopologicalMap, Vertex};
 
-    /// A triangle with a tail, and a self-loop at its end.
+    /// A triangle with a tail that ends in a self-loop.
     pub(crate) fn map() -> (TopologicalMap, Vec<Point>) {
         let radii_mm = [900, 1200, 640, 480];
         let vertices = radii_mm.map(|radius_mm| Vertex { radius_mm, visits: 7 }).to_vec();

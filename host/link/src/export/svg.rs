@@ -1,4 +1,4 @@
-//! A picture of a map alone, as SVG.
+//! SVG drawing of a map without a floor plan.
 
 use svg::Document;
 use svg::node::element::{Rectangle, Title};
@@ -7,13 +7,13 @@ use super::marks::{self, Mark};
 use crate::layout::Point;
 use crate::topology::TopologicalMap;
 
-/// An edge is about this long, beside dots of their usual size.
+/// Approximate length of an edge, in units of the document.
 const EDGE_MM: f64 = 2500.0;
 const MARGIN_MM: f64 = 1100.0;
 
-/// The map as an SVG document: each vertex with its number and radius, where the robot is with a blue rim.
+/// The map as an SVG document: each vertex with its number and radius. The robot's vertex has a blue rim.
 pub fn svg(map: &TopologicalMap, points: &[Point], here: Option<u8>) -> String {
-    // The picture's y axis points down.
+    // The y axis of SVG points down.
     let marks: Vec<Mark> = map
         .vertices
         .iter()
@@ -51,17 +51,17 @@ mod tests {
     use crate::export::sample;
 
     #[test]
-    fn every_vertex_is_a_dot_every_edge_a_line_and_the_robot_is_marked() {
+    fn svg_has_a_dot_per_vertex_a_line_per_edge_and_marks_the_robot() {
         let (map, points) = sample::map();
         let text = svg(&map, &points, Some(1));
-        // Four dots, a loop and the robot's rim.
+        // Four dots, a self-loop and the robot's rim.
         assert_eq!((text.matches("<line").count(), text.matches("<circle").count()), (4, 6));
         assert_eq!(svg(&map, &points, None).matches("<circle").count(), 5);
         assert!(text.contains("0.64 m"), "{text}");
     }
 
     #[test]
-    fn an_empty_map_is_an_empty_picture() {
+    fn an_empty_map_gives_a_valid_svg() {
         assert!(!svg(&TopologicalMap::default(), &[], None).contains("NaN"));
     }
 }

@@ -1,14 +1,14 @@
-//! A picture without crossings in which every inner vertex is a weighted mean of its neighbours, after Tutte and Floater.
+//! Planar drawing with each inner vertex at a weighted mean of its neighbours, after Tutte and Floater.
 
 use super::{Point, triangulation::Triangulation};
 
-/// How often the weights are changed to make the edges more alike.
+/// Number of weight updates that equalise the edge lengths.
 const ROUNDS: usize = 12;
 
-/// The positions of all vertices: the outermost face is a regular polygon, and the other edges are about as long as each other.
+/// Positions of all vertices: the outer face is a regular polygon, and the other edges have similar lengths.
 ///
-/// Any positive weights give a picture without crossings, but only as far as numbers can tell: the vertices may come very close
-/// to each other. Cost: O(vertices³).
+/// Any positive weights give a drawing without crossings, up to rounding errors: vertices may come very close to each
+/// other. Cost: O(vertices³).
 pub(super) fn draw(triangulation: &Triangulation) -> Vec<Point> {
     let graph = &triangulation.graph;
     let rim = &triangulation.rim;
@@ -21,7 +21,7 @@ pub(super) fn draw(triangulation: &Triangulation) -> Vec<Point> {
     for round in 0..ROUNDS {
         solve(triangulation, &inner, &weights, &mut points);
         if round + 1 < ROUNDS {
-            // What is long pulls more.
+            // Longer edges get larger weights.
             for (weight, &(a, b)) in weights.iter_mut().zip(graph.edges()) {
                 *weight *= (points[a] - points[b]).length().max(1e-6);
             }
@@ -32,7 +32,7 @@ pub(super) fn draw(triangulation: &Triangulation) -> Vec<Point> {
     points
 }
 
-/// Brings the inner vertices to the weighted means of their neighbours, by Gauss's elimination.
+/// Moves the inner vertices to the weighted means of their neighbours, by Gaussian elimination.
 fn solve(triangulation: &Triangulation, inner: &[usize], weights: &[f64], points: &mut [Point]) {
     let count = inner.len();
     let mut row_of = vec![usize::MAX; points.len()];
@@ -53,7 +53,7 @@ fn solve(triangulation: &Triangulation, inner: &[usize], weights: &[f64], points
             }
         }
     }
-    // The diagonal outweighs the rest of each row, so that no pivot has to be looked for.
+    // The matrix is diagonally dominant: no pivoting is needed.
     for pivot in 0..count {
         let (above, below) = matrix.split_at_mut(pivot + 1);
         let pivot_row = &above[pivot];

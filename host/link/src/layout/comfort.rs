@@ -1,26 +1,26 @@
-//! What makes a picture pleasant: edges about 1 long, wide angles, and room around vertices and edges.
+//! Cost of a drawing: prefers edges of length 1, wide angles, and space around vertices and edges.
 
 use super::{Point, conflicts::EDGE_CLEARANCE, geometry, graph::Graph};
 
-/// Vertices push each other away with this weight.
+/// Weight of the repulsion between vertices.
 const REPULSION: f64 = 0.15;
 
-/// A vertex is kept this far from edges of others, where there is room.
+/// Preferred minimum distance of a vertex from edges of others.
 const MARGIN: f64 = 0.6;
 const MARGIN_WEIGHT: f64 = 2.0;
 const HIDING_WEIGHT: f64 = 5.0;
 
-/// How much angles between edges weigh.
+/// Weight of the angles between edges.
 const ANGLE_WEIGHT: f64 = 0.3;
 const PLEASANT_COSINE: f64 = -0.7;
 
-/// How unpleasant the picture is by what depends on `vertex`, when that is at a point.
+/// Cost of all terms that depend on `vertex`, at a given point.
 ///
-/// Adding up ends when it is more than `limit`.
+/// The sum stops above `limit`.
 pub(super) fn discomfort_of(graph: &Graph, points: &[Point], vertex: usize, at: Point, limit: f64) -> f64 {
     let mut discomfort = 0.0;
     let mut add = |cost: f64| {
-        // What has no position costs nothing.
+        // A vertex without a position has no cost.
         if !cost.is_nan() {
             discomfort += cost;
         }
@@ -56,16 +56,17 @@ pub(super) fn discomfort_of(graph: &Graph, points: &[Point], vertex: usize, at: 
     discomfort
 }
 
-/// What the angle between two edges at a vertex costs: most when it is narrow, nothing at some 135°.
+/// Cost of the angle between two edges at a vertex: largest for a narrow angle, zero at about 135°.
 ///
-/// Straight on costs a little too, because an edge that closes the round of a straight row lies on all the vertices of it.
+/// A straight angle has a small cost too, because an edge that closes a straight row to a cycle lies on all its
+/// vertices.
 fn narrowness(first: Point, second: Point) -> f64 {
     let cosine = first.dot(second) / (first.squared() * second.squared()).sqrt();
     let share = (cosine - PLEASANT_COSINE).abs() / (1.0 - PLEASANT_COSINE);
     ANGLE_WEIGHT * share * share
 }
 
-/// Grows towards an edge, and without end when it comes too close.
+/// Increases towards an edge, and steeply within the minimum clearance.
 fn crowding(point: Point, edge: (Point, Point)) -> f64 {
     if !geometry::may_be_near(point, edge, MARGIN) {
         return 0.0;

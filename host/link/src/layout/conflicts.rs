@@ -1,19 +1,19 @@
-//! What no picture should have: edges that cross, vertices too close to each other, and vertices on edges of others.
+//! Conflicts in a drawing: crossing edges, vertices too close to each other, and vertices on edges of others.
 
 use super::{Point, geometry, graph::Graph};
 
-/// Vertices are at least this far apart.
+/// Minimum distance between two vertices.
 pub(super) const VERTEX_CLEARANCE: f64 = 0.35;
 
-/// A vertex is at least this far from an edge that does not end at it.
+/// Minimum distance of a vertex from an edge that does not end at it.
 pub(super) const EDGE_CLEARANCE: f64 = 0.12;
 
-/// How much worse it is that something hides something than that edges cross.
+/// Weight of an overlap relative to a crossing.
 const HIDING: u32 = 5;
 
-/// How much conflicts with the rest of the picture when `vertex` is at a point; 0 when nothing does.
+/// Weighted number of conflicts of `vertex` at a point with the rest of the drawing; 0 if there are none.
 ///
-/// Counting ends when there is more than `limit`.
+/// Counting stops above `limit`.
 pub(super) fn conflicts_of(graph: &Graph, points: &[Point], vertex: usize, at: Point, limit: u32) -> u32 {
     let mut conflicts = 0;
     for &point in points[..vertex].iter().chain(&points[vertex + 1..]) {
@@ -44,7 +44,7 @@ pub(super) fn conflicts_of(graph: &Graph, points: &[Point], vertex: usize, at: P
     conflicts
 }
 
-/// How many edges the edges of `vertex` cross when it is at a point. Counting ends when they are more than `limit`.
+/// Number of edges that the edges of `vertex` at a point cross. Counting stops above `limit`.
 pub(super) fn crossings_of(graph: &Graph, points: &[Point], vertex: usize, at: Point, limit: u32) -> u32 {
     let mut crossings = 0;
     for &(a, b) in graph.edges().iter().filter(|&&(a, b)| a != vertex && b != vertex) {
@@ -58,7 +58,7 @@ pub(super) fn crossings_of(graph: &Graph, points: &[Point], vertex: usize, at: P
     crossings
 }
 
-/// How much conflicts in a whole picture; 0 when nothing does.
+/// Weighted number of conflicts of a whole drawing; 0 if there are none.
 pub(super) fn conflicts(graph: &Graph, points: &[Point]) -> u32 {
     let edges = graph.edges();
     let mut conflicts = crossings(graph, points);
@@ -73,7 +73,7 @@ pub(super) fn conflicts(graph: &Graph, points: &[Point]) -> u32 {
     conflicts
 }
 
-/// How many pairs of edges cross.
+/// Number of pairs of edges that cross.
 pub(super) fn crossings(graph: &Graph, points: &[Point]) -> u32 {
     let segment = |(a, b): (usize, usize)| (points[a], points[b]);
     let mut crossings = 0;
@@ -86,7 +86,7 @@ pub(super) fn crossings(graph: &Graph, points: &[Point]) -> u32 {
     crossings
 }
 
-/// By how much a picture has to grow so that nothing hides anything, and a hair more; at least 1.
+/// Growth factor that removes all overlaps, with a small margin; at least 1.
 pub(super) fn growth(graph: &Graph, points: &[Point]) -> f64 {
     let mut growth: f64 = 1.0;
     for (vertex, &point) in points.iter().enumerate() {
@@ -120,7 +120,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_conflicts_of_one_vertex_are_those_that_go_with_it() {
+    fn moving_a_vertex_removes_exactly_its_conflicts() {
         let mut graph = Graph::new(6);
         [(0, 1), (2, 3), (4, 5)].into_iter().for_each(|(a, b)| graph.connect(a, b));
         let at = |x, y| Point::new(x, y);

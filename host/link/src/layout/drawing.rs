@@ -1,15 +1,15 @@
-//! A picture without crossings on whole coordinates, by the shift method of de Fraysseix, Pach and Pollack.
+//! Straight-line planar drawing on integer coordinates by the shift method of de Fraysseix, Pach and Pollack.
 
 use super::{Point, triangulation::Triangulation};
 
-/// The positions of all vertices: whole numbers, `x` from 0 to 2·vertices − 4, `y` from 0 to vertices − 2.
+/// Positions of all vertices as integers: `x` from 0 to 2·vertices − 4, `y` from 0 to vertices − 2.
 ///
 /// Cost: O(vertices²).
 pub(super) fn draw(triangulation: &Triangulation) -> Vec<Point> {
     let vertices = triangulation.graph.vertices();
     let [left, right, _] = triangulation.outer;
     let mut positions = vec![(0_i64, 0_i64); vertices];
-    // The upper boundary of what is drawn, from left to right; with each vertex go those below it that shift with it.
+    // The upper boundary of the drawing from left to right; the vertices below a boundary vertex shift with it.
     let mut boundary = vec![(left, vec![left]), (right, vec![right])];
     for Step { vertex, below } in steps(triangulation) {
         let index = |of: usize| boundary.iter().position(|(other, _)| *other == of).unwrap_or(0);
@@ -19,7 +19,7 @@ pub(super) fn draw(triangulation: &Triangulation) -> Vec<Point> {
             moving.iter().for_each(|&moved| positions[moved].0 += shift);
         }
         let ((x1, y1), (x2, y2)) = (positions[boundary[from].0], positions[boundary[to].0]);
-        // Up to the right from one, up to the left from the other. Both are an even number of steps apart.
+        // The intersection of a diagonal up to the right with one up to the left. The ends are an even distance apart.
         positions[vertex] = ((x1 + x2 + y2 - y1) / 2, (x2 - x1 + y2 + y1) / 2);
         let covered: Vec<usize> =
             boundary[from + 1..to].iter().flat_map(|(_, moving)| moving.iter().copied()).collect();
@@ -29,13 +29,13 @@ pub(super) fn draw(triangulation: &Triangulation) -> Vec<Point> {
     positions.into_iter().map(|(x, y)| Point::new(x as f64, y as f64)).collect()
 }
 
-/// A vertex to be drawn next, and the piece of the boundary that it covers, from left to right.
+/// The next vertex to draw, and the part of the boundary that it covers, from left to right.
 struct Step {
     vertex: usize,
     below: Vec<usize>,
 }
 
-/// The canonical order without its first two vertices: each vertex covers a piece of the boundary of those before it.
+/// The canonical order without its first two vertices: each vertex covers part of the boundary of the previous ones.
 fn steps(triangulation: &Triangulation) -> Vec<Step> {
     let graph = &triangulation.graph;
     let [left, right, top] = triangulation.outer;
@@ -43,7 +43,7 @@ fn steps(triangulation: &Triangulation) -> Vec<Step> {
     let mut on_boundary = vec![false; graph.vertices()];
     boundary.iter().for_each(|&vertex| on_boundary[vertex] = true);
     let mut steps = Vec::new();
-    // Backwards: a vertex of the boundary that has only its neighbours there in common with it may go.
+    // In reverse order: a boundary vertex whose only neighbours on the boundary are the two beside it can be removed.
     while boundary.len() > 2 {
         let is_free =
             |&index: &usize| graph.neighbours(boundary[index]).iter().filter(|&&other| on_boundary[other]).count() == 2;

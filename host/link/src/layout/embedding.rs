@@ -1,12 +1,11 @@
-//! Whether a graph can be drawn without crossings, and how: the faces of such a drawing, after Demoucron, Malgrange and
-//! Pertuiset.
+//! Planarity test and planar embedding by the algorithm of Demoucron, Malgrange and Pertuiset.
 
 use super::graph::Graph;
 
-/// The faces of a drawing without crossings of a biconnected graph of at least three vertices; `None` when there is none.
+/// The faces of a planar embedding of a biconnected graph of at least three vertices; `None` if it is not planar.
 ///
-/// Each face is the cycle around it, and all have it on the same side, so that each edge is passed once each way.
-/// Cost: O(edges · (vertices + edges)).
+/// Each face is the cycle around it. All cycles have the same orientation, so that each edge occurs once in each
+/// direction. Cost: O(edges · (vertices + edges)).
 pub(super) fn faces(graph: &Graph) -> Option<Vec<Vec<usize>>> {
     let vertices = graph.vertices();
     if graph.edges().len() > (3 * vertices).saturating_sub(6) {
@@ -19,7 +18,7 @@ pub(super) fn faces(graph: &Graph) -> Option<Vec<Vec<usize>>> {
     let mut faces = vec![cycle, backwards];
     loop {
         let fragments = fragments(graph, &drawn);
-        // The fragment with the least choice goes first: one that fits into one face only may not find it taken.
+        // The fragment with the fewest admissible faces is drawn first: if only one face fits, it must still be free.
         let mut best: Option<(usize, usize, &Fragment)> = None;
         for fragment in &fragments {
             let fits = |face: &[usize]| fragment.attachments.iter().all(|attachment| face.contains(attachment));
@@ -39,7 +38,7 @@ pub(super) fn faces(graph: &Graph) -> Option<Vec<Vec<usize>>> {
     }
 }
 
-/// What is drawn already.
+/// The part of the graph that is already embedded.
 struct Drawn {
     vertices: Vec<bool>,
     edges: Vec<Vec<bool>>,
@@ -61,15 +60,15 @@ impl Drawn {
     }
 }
 
-/// A connected piece of what is not drawn yet, with the drawn vertices that it hangs on.
+/// A connected component of the remaining graph, with the embedded vertices to which it is attached.
 struct Fragment {
-    /// Its vertices that are not drawn; none for a single edge.
+    /// Its vertices that are not embedded; none for a single edge.
     inner: Vec<usize>,
     attachments: Vec<usize>,
 }
 
 impl Fragment {
-    /// A way through it from one drawn vertex to another.
+    /// A path through it from one embedded vertex to another.
     fn path(&self, graph: &Graph, drawn: &Drawn) -> Vec<usize> {
         if self.inner.is_empty() {
             return self.attachments.clone();
@@ -93,7 +92,7 @@ impl Fragment {
                 open.push_back(next);
             }
         }
-        unreachable!("in a biconnected graph every fragment hangs on two vertices")
+        unreachable!("in a biconnected graph every fragment is attached to two vertices")
     }
 }
 
@@ -115,7 +114,7 @@ fn fragments(graph: &Graph, drawn: &Drawn) -> Vec<Fragment> {
     fragments
 }
 
-/// Any cycle of a biconnected graph: the first edge, and another way between its ends.
+/// Any cycle of a biconnected graph: the first edge and another path between its ends.
 fn cycle(graph: &Graph) -> Vec<usize> {
     let (a, b) = graph.edges()[0];
     let mut from = vec![usize::MAX; graph.vertices()];
@@ -136,7 +135,7 @@ fn cycle(graph: &Graph) -> Vec<usize> {
     cycle
 }
 
-/// The two faces that a path between two vertices of a face makes of it.
+/// The two faces into which a path between two vertices of a face divides it.
 fn split(face: &[usize], path: &[usize]) -> (Vec<usize>, Vec<usize>) {
     let index = |vertex: usize| face.iter().position(|&other| other == vertex).unwrap_or(0);
     let (from, to) = (index(path[0]), index(path[path.len() - 1]));
@@ -163,7 +162,7 @@ mod tests {
     }
 
     #[test]
-    fn the_smallest_graphs_that_are_not_planar_are_refused() {
+    fn the_smallest_non_planar_graphs_are_refused() {
         assert!(faces(&complete(5)).is_none());
         let houses_and_wells = (0..3).flat_map(|house| (3..6).map(move |well| (house, well)));
         assert!(faces(&graph(6, houses_and_wells)).is_none());
@@ -172,7 +171,7 @@ mod tests {
     }
 
     #[test]
-    fn the_faces_pass_each_edge_once_each_way_and_are_as_many_as_euler_says() {
+    fn faces_use_each_edge_once_per_direction_and_satisfy_eulers_formula() {
         let wheel = graph(9, (0..8).flat_map(|i| [(i, (i + 1) % 8), (i, 8)]));
         let ladder =
             graph(12, (0..6).flat_map(|i| [(i, i + 6)]).chain((0..5).flat_map(|i| [(i, i + 1), (i + 6, i + 7)])));

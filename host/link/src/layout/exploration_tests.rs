@@ -1,4 +1,4 @@
-//! The picture of a map that a robot makes, update by update.
+//! The layout of an explored map, update by update.
 
 use toposlam::reference::SNAPSHOT_BYTES;
 use toposlam::wire::Message;
@@ -11,20 +11,20 @@ use toposlam_sim::world::{Plan, RobotModel};
 const RUNS: u64 = 6;
 const PLACES: usize = 50;
 
-/// What became of the picture in all runs.
+/// Statistics over all runs.
 #[derive(Debug, Default)]
 struct Tally {
     updates: usize,
-    /// Updates in which a vertex that had a position moved.
+    /// Updates in which a vertex that already had a position moved.
     moved: usize,
     vertices_moved: usize,
-    /// Updates to maps that cannot be drawn without crossings.
+    /// Updates to maps that are not planar.
     not_planar: usize,
     farthest: f64,
 }
 
 impl Tally {
-    /// Takes in the map as heard now.
+    /// Arranges the current map and updates the statistics.
     fn arrange(&mut self, layout: &mut Layout, listener: &Listener) {
         let map = listener.map();
         let before = layout.points().to_vec();
@@ -50,7 +50,7 @@ impl Tally {
 }
 
 #[test]
-fn the_picture_of_an_exploration_mostly_stands_still() {
+fn the_layout_of_an_exploration_rarely_changes() {
     let plan = Plan::built_in("office").unwrap();
     let mut tally = Tally::default();
     for seed in 1..=RUNS {
@@ -61,7 +61,7 @@ fn the_picture_of_an_exploration_mostly_stands_still() {
             exploration.advance();
             listener.feed(&exploration.board().sent, |listener, event| match event {
                 Event::Message(header, message @ Message::Remapped(_)) => layout.hear(header, message),
-                // With this all of an update is heard.
+                // At this message the update is complete.
                 Event::Message(_, Message::Map { .. }) => tally.arrange(&mut layout, listener),
                 Event::Message(..) | Event::Damaged(_) => {}
             });

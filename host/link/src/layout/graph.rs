@@ -1,4 +1,4 @@
-//! The graph of a map as far as positions depend on it: without labels, and without self-loops.
+//! The part of a map that determines the layout: no labels and no self-loops.
 
 use crate::topology::TopologicalMap;
 
@@ -22,7 +22,7 @@ impl Graph {
         graph
     }
 
-    /// Adds an edge, unless it is a self-loop, is there, or leaves the graph.
+    /// Adds an edge, unless it is a self-loop, already exists, or has an end outside the graph.
     pub(super) fn connect(&mut self, a: usize, b: usize) {
         if a != b && a.max(b) < self.vertices() && !self.connects(a, b) {
             self.edges.push((a.min(b), a.max(b)));
@@ -31,7 +31,7 @@ impl Graph {
         }
     }
 
-    /// Takes back the edge that was added last.
+    /// Removes the edge that was added last.
     pub(super) fn disconnect_last(&mut self) {
         if let Some((a, b)) = self.edges.pop() {
             self.neighbours[a].pop();
@@ -55,7 +55,7 @@ impl Graph {
         &self.neighbours[vertex]
     }
 
-    /// The connected parts of what is left without some vertices, each in ascending order.
+    /// The connected components after removing some vertices, each in ascending order.
     pub(super) fn parts_without(&self, left_out: &[usize]) -> Vec<Vec<usize>> {
         let mut seen = vec![false; self.vertices()];
         left_out.iter().for_each(|&vertex| seen[vertex] = true);

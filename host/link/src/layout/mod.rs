@@ -1,7 +1,7 @@
-//! Where to draw the vertices of a map that has no positions: a picture that does not jump from one update to the next.
+//! Positions for drawing a map, which itself has no coordinates, stable from one update to the next.
 //!
-//! No edges cross where the graph allows that, and no vertex lies on another or on an edge of others. A vertex keeps its
-//! position as long as that is so; a new one goes beside its neighbours.
+//! Edges of a planar graph do not cross, and no vertex lies on another or on an edge of others. A vertex keeps its
+//! position as long as that holds; a new vertex is placed beside its neighbours.
 //!
 //! ```
 //! use toposlam_link::layout::Layout;
@@ -33,18 +33,18 @@ use toposlam::wire::{Arrival, Header, Message, Remapped};
 use self::graph::Graph;
 use crate::topology::TopologicalMap;
 
-/// A position in the picture; an edge is about 1 long. `y` points up.
+/// A position in the drawing, in units of about one edge length. `y` points up.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Point {
-    /// To the right.
+    /// Horizontal, to the right.
     pub x: f64,
-    /// Up.
+    /// Vertical, upwards.
     pub y: f64,
 }
 
-/// Positions for the vertices of a map that grows.
+/// Positions for the vertices of a growing map.
 ///
-/// The same maps in the same order give the same picture.
+/// Deterministic: the same maps in the same order give the same layout.
 #[derive(Clone, Debug, Default)]
 pub struct Layout {
     graph: Graph,
@@ -52,16 +52,16 @@ pub struct Layout {
 }
 
 impl Layout {
-    /// An empty picture.
+    /// A layout without vertices.
     pub fn new() -> Self {
         Self::default()
     }
 
-    /// Gives every vertex of the map a position; those that have one keep it as far as possible.
+    /// Gives every vertex of the map a position; existing positions are kept where possible.
     ///
-    /// Edges of a map that is planar do not cross. Any two vertices are 0.35 apart or more, and a vertex is 0.12 or more from an edge
-    /// that does not end at it; on a map that is not planar both as far as possible. Self-loops and labels play no part.
-    /// Cost: nothing to speak of when the graph is the one before.
+    /// Edges of a planar map do not cross. Any two vertices are at least 0.35 apart, and a vertex is at least 0.12 from
+    /// an edge that does not end at it; on a map that is not planar both hold as far as possible. Self-loops and labels
+    /// have no influence. Cost: negligible if the graph is unchanged.
     pub fn arrange(&mut self, map: &TopologicalMap) {
         let graph = Graph::of(map);
         if graph == self.graph && self.points.iter().all(|point| point.is_known()) {
@@ -82,15 +82,15 @@ impl Layout {
         }
         let points = redrawing::redraw(&self.graph, &before);
         let redrawn = conflicts::conflicts(&self.graph, &points);
-        // Where crossings cannot be helped, a few less do not make up for a picture that jumps.
+        // On a non-planar map a few fewer crossings do not justify a jump of the drawing.
         let is_worth_it = redrawn == 0 || 2 * redrawn < left || left > conflicts::crossings(&self.graph, &self.points);
         if redrawn < left && is_worth_it {
             self.points = points;
         }
     }
 
-    /// Takes in what a message tells of the numbers of the vertices: that they are others now, or that the robot has started anew and
-    /// so has the picture.
+    /// Applies a message that changes vertex numbers: renumbers the vertices, or clears the drawing after a restart of
+    /// the robot.
     pub fn hear(&mut self, header: Header, message: &Message) {
         match header.arrival {
             Arrival::Late => return,
@@ -102,10 +102,10 @@ impl Layout {
         }
     }
 
-    /// The robot has given its vertices new numbers: each keeps its position under the new one.
+    /// Renumbers the vertices; each keeps its position.
     ///
-    /// Of vertices that are one now, the first one's position stays. [`Layout::arrange`] is to follow: until then a vertex without
-    /// a position is at NaN.
+    /// Of merged vertices the first one's position is kept. Call [`Layout::arrange`] afterwards: until then a vertex
+    /// without a position is at NaN.
     pub fn rename(&mut self, renamed: &Remapped) {
         let mut points = Vec::new();
         for (before, &point) in (0..=u8::MAX).zip(&self.points) {
@@ -126,7 +126,7 @@ impl Layout {
         &self.points
     }
 
-    /// Places the vertices that have no position, those with most neighbours in the picture first.
+    /// Places the vertices that have no position, in descending order of placed neighbours.
     fn place_new(&mut self) {
         loop {
             let graph = &self.graph;

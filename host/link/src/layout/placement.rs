@@ -1,17 +1,17 @@
-//! A good position for one vertex while all others stay where they are.
+//! Finds a good position for one vertex while all others are fixed.
 
 use super::{Point, comfort::discomfort_of, conflicts::conflicts_of, geometry, graph::Graph};
 
 const DIRECTIONS: u32 = 24;
 const DISTANCES: [f64; 6] = [1.0, 0.7, 0.5, 1.4, 2.0, 3.0];
 
-/// So many rows and columns at most lie over the picture.
+/// Maximum number of rows and columns of the search grid over the drawing.
 const GRID: u32 = 14;
 
-/// How much it weighs how far a vertex without neighbours is from the middle.
+/// Weight of the distance from the centre for a vertex without neighbours.
 const TO_THE_MIDDLE: f64 = 0.1;
 
-/// The best position for a vertex that has none, among its neighbours.
+/// The best position for a vertex without a position, given its neighbours.
 pub(super) fn place(graph: &Graph, points: &[Point], vertex: usize) -> Point {
     let Some((low, high)) = geometry::bounds(points) else { return Point::default() };
     let middle = (low + high) * 0.5;
@@ -24,7 +24,7 @@ pub(super) fn place(graph: &Graph, points: &[Point], vertex: usize) -> Point {
     let close = if is_alone { None } else { search.best(around_neighbours(graph, points, vertex), None) };
     match close {
         Some(close) if close.conflicts == 0 => close.at,
-        // An edge of more than 1 is better than one that crosses.
+        // An edge longer than 1 is better than a crossing.
         close => search.best(over_the_picture(points), close).map_or(middle, |found| found.at),
     }
 }
@@ -34,11 +34,11 @@ pub(super) struct Search<'picture, COST> {
     pub(super) graph: &'picture Graph,
     pub(super) points: &'picture [Point],
     pub(super) vertex: usize,
-    /// What decides between positions with as many conflicts.
+    /// Decides between positions with equal numbers of conflicts.
     pub(super) cost: COST,
 }
 
-/// A position and what it would bring.
+/// A position with its conflicts and cost.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Found {
     pub(super) at: Point,
@@ -47,7 +47,7 @@ pub(super) struct Found {
 }
 
 impl<COST: Fn(Point) -> f64> Search<'_, COST> {
-    /// The best of some positions and one found before: that with the fewest conflicts, and of those the one with the least cost.
+    /// The best of the given positions and the previous result: fewest conflicts first, then least cost.
     pub(super) fn best(&self, candidates: impl Iterator<Item = Point>, before: Option<Found>) -> Option<Found> {
         let mut best = before;
         for at in candidates {
@@ -65,7 +65,7 @@ impl<COST: Fn(Point) -> f64> Search<'_, COST> {
     }
 }
 
-/// Positions around the neighbours that have one, at the distance of a good edge and others.
+/// Positions around the neighbours, at the preferred edge length and at others.
 pub(super) fn around_neighbours(graph: &Graph, points: &[Point], vertex: usize) -> impl Iterator<Item = Point> {
     let neighbours = graph.neighbours(vertex).iter().map(|&neighbour| points[neighbour]);
     let known: Vec<Point> = neighbours.filter(|point| point.is_known()).collect();
@@ -78,7 +78,7 @@ fn around(centre: Point) -> impl Iterator<Item = Point> {
     directions.flat_map(move |angle| DISTANCES.map(|distance| centre + Point::towards(angle) * distance))
 }
 
-/// Positions all over the picture and a little beyond.
+/// Positions over the whole drawing and a little beyond.
 pub(super) fn over_the_picture(points: &[Point]) -> impl Iterator<Item = Point> {
     let (low, high) = geometry::bounds(points).unwrap_or_default();
     let margin = Point::new(1.5, 1.5);

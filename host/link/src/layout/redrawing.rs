@@ -1,4 +1,4 @@
-//! A picture from scratch: without crossings where the graph allows that, and as much like the picture before as it can be.
+//! Draws a graph from scratch: without crossings if it is planar, and as close to the previous drawing as possible.
 
 use super::{
     Point, barycentres,
@@ -12,18 +12,19 @@ use super::{
     untangling::untangle,
 };
 
-/// Sweeps of smoothing of a drawing, and again when it is laid over the picture before.
+/// Sweeps of smoothing after drawing, and again after alignment with the previous drawing.
 const SWEEPS: u32 = 16;
 
-/// A picture that has to grow by more than this, so that nothing hides anything, is drawn in another way.
+/// Maximum growth to remove overlaps; beyond it the next drawing method is tried.
 const TOO_SMALL: f64 = 2.0;
 
-/// A picture with crossings grows by this at most.
+/// Maximum growth of a drawing with crossings.
 const MOST_GROWTH: f64 = 4.0;
 
-/// Draws the whole graph; `before` are the positions to be kept where possible.
+/// Draws the whole graph. `before` holds the positions to keep where possible.
 ///
-/// A planar graph is drawn without any conflict, any other without those edges that make it so, which then cross some.
+/// A planar graph is drawn without conflicts. For any other graph a planar subgraph is drawn, and the remaining edges
+/// cross.
 pub(super) fn redraw(graph: &Graph, before: &[Point]) -> Vec<Point> {
     let all: Vec<usize> = (0..graph.vertices()).collect();
     let nowhere = vec![Point::UNKNOWN; all.len()];
@@ -46,7 +47,7 @@ pub(super) fn redraw(graph: &Graph, before: &[Point]) -> Vec<Point> {
     points
 }
 
-/// As many edges as fit without crossings.
+/// A maximal planar subgraph.
 fn planar_part(graph: &Graph) -> Graph {
     let mut part = Graph::new(graph.vertices());
     for &(a, b) in graph.edges() {
@@ -58,12 +59,12 @@ fn planar_part(graph: &Graph) -> Graph {
     part
 }
 
-/// A way to the positions of a triangulation's vertices.
+/// A method that gives the positions of a triangulation's vertices.
 type Method = fn(&Triangulation) -> Vec<Point>;
 
-/// A picture of a planar graph without conflicts.
+/// A drawing of a planar graph without conflicts.
 ///
-/// What is drawn without trees and bends looks best, but may leave no room for them; the last way always works.
+/// Drawing without trees and bends looks best, but may leave no room for them; the last method always succeeds.
 fn draw(graph: &Graph) -> Vec<Point> {
     let ways: [(bool, Method); 3] = [(true, barycentres::draw), (false, barycentres::draw), (false, drawing::draw)];
     let mut best: Option<(f64, Vec<Point>)> = None;
@@ -81,7 +82,7 @@ fn draw(graph: &Graph) -> Vec<Point> {
     best.map_or_else(Vec::new, |(_, points)| points)
 }
 
-/// A picture without conflicts, and by how much it had to grow for that; `None` when there is no room, or it is no planar graph.
+/// A drawing without conflicts and its growth factor; `None` if there is no room or the graph is not planar.
 fn draw_in_one_way(graph: &Graph, reduction: &Reduction, method: Method) -> Option<(f64, Vec<Point>)> {
     let mut points = vec![Point::UNKNOWN; graph.vertices()];
     if !reduction.kept.is_empty() {
@@ -91,7 +92,8 @@ fn draw_in_one_way(graph: &Graph, reduction: &Reduction, method: Method) -> Opti
     for &(bend, (one, other)) in reduction.bends.iter().rev() {
         points[bend] = (points[one] + points[other]) * 0.5;
     }
-    // Its edges are about as long as they should be, and what is too close then comes apart; the rest of it by growth.
+    // At first the mean edge length is 1 and vertices too close to each other move apart; growth removes the remaining
+    // overlaps.
     let length = mean_length(graph, &points);
     scale(&mut points, 1.0 / length);
     let drawn: Vec<usize> = (0..points.len()).filter(|&vertex| points[vertex].is_known()).collect();
@@ -109,7 +111,7 @@ fn scale(points: &mut [Point], factor: f64) {
     points.iter_mut().for_each(|point| *point = *point * factor);
 }
 
-/// The mean length of the edges; 1 when there are none.
+/// Mean edge length; 1 for a graph without edges.
 fn mean_length(graph: &Graph, points: &[Point]) -> f64 {
     let lengths = graph.edges().iter().map(|&(a, b)| (points[a] - points[b]).length());
     let (sum, count) = lengths
@@ -118,12 +120,12 @@ fn mean_length(graph: &Graph, points: &[Point]) -> f64 {
     if count == 0.0 { 1.0 } else { sum / count }
 }
 
-/// Turns, mirrors and shifts a picture so that it lies as well as possible over the one before.
+/// Rotates, mirrors and translates a drawing to the best fit with the previous one.
 fn lay_over(points: &mut [Point], before: &[Point]) {
     let pairs = || points.iter().zip(before).filter(|(_, before)| before.is_known());
     let (from, to) = (geometry::mean(pairs().map(|pair| *pair.0)), geometry::mean(pairs().map(|pair| *pair.1)));
     let mirror = |point: Point, sign: f64| Point::new(point.x, sign * point.y);
-    // The turn by the angle of the sum of products brings the directions together best, and its length says how well.
+    // The angle of the sum of products is the best rotation; its magnitude measures the fit.
     let turn = |sign: f64| {
         let products = pairs().map(|(point, before)| (mirror(*point - from, sign), *before - to));
         let (cosine, sine) = products.fold((0.0, 0.0), |(cosine, sine), (point, before)| {
@@ -141,7 +143,7 @@ fn lay_over(points: &mut [Point], before: &[Point]) {
     }
 }
 
-/// Puts vertices exactly where they were, as long as that makes no conflict.
+/// Moves vertices back to their exact previous positions where that causes no conflict.
 fn put_back(graph: &Graph, points: &mut [Point], before: &[Point]) {
     loop {
         let mut moved = false;

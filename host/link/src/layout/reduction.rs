@@ -1,15 +1,15 @@
-//! What of a graph decides whether and how it can be drawn without crossings: neither its trees, nor the bends of its ways.
+//! Reduces a graph to the part that determines planarity: removes trees and contracts paths of degree-2 vertices.
 
 use super::graph::Graph;
 
-/// A graph without its leaves, their twigs and so on, and with ways of several edges made one.
+/// A graph without its trees, in which each path through vertices of degree 2 is one edge.
 pub(super) struct Reduction {
-    /// What is left; vertex `n` of it is `kept[n]`.
+    /// The reduced graph; its vertex `n` is `kept[n]`.
     pub(super) graph: Graph,
     pub(super) kept: Vec<usize>,
-    /// The vertices of the trees, the outermost first.
+    /// The vertices of the trees, outermost first.
     pub(super) leaves: Vec<usize>,
-    /// The vertices on the ways, each with the two that it was between when it was taken out.
+    /// The vertices of degree 2, each with its two neighbours at the time of its removal.
     pub(super) bends: Vec<(usize, (usize, usize))>,
 }
 
@@ -50,7 +50,7 @@ impl Reduction {
         Self { graph: reduced, kept, leaves, bends }
     }
 
-    /// Nothing taken out.
+    /// The reduction that removes nothing.
     pub(super) fn none(graph: &Graph) -> Self {
         Self { graph: graph.clone(), kept: (0..graph.vertices()).collect(), leaves: Vec::new(), bends: Vec::new() }
     }
@@ -61,7 +61,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_house_with_a_garden_path_is_a_triangle() {
+    fn a_cycle_with_a_tail_reduces_to_a_triangle() {
         let mut graph = Graph::new(7);
         [(0, 1), (1, 2), (2, 3), (3, 4), (4, 0), (2, 5), (5, 6)].into_iter().for_each(|(a, b)| graph.connect(a, b));
         let reduction = Reduction::of(&graph);
@@ -72,7 +72,7 @@ mod tests {
     }
 
     #[test]
-    fn a_tree_is_nothing_but_leaves() {
+    fn all_vertices_of_a_tree_are_removed_as_leaves() {
         let mut graph = Graph::new(4);
         [(0, 1), (1, 2), (1, 3)].into_iter().for_each(|(a, b)| graph.connect(a, b));
         assert_eq!(Reduction::of(&graph).leaves.len(), 4);

@@ -1,4 +1,4 @@
-//! A picture made more pleasant step by step, without a conflict more than it has.
+//! Improves a drawing step by step without adding conflicts.
 
 use super::{
     Point,
@@ -8,16 +8,17 @@ use super::{
     graph::Graph,
 };
 
-/// How strongly a vertex is drawn to its anchor.
+/// Weight of the attraction of a vertex to its anchor.
 const ANCHOR_WEIGHT: f64 = 0.5;
 
-/// The first steps are this long, the last this short.
+/// Length of the first and of the last steps.
 const FIRST_STEP: f64 = 0.5;
 const LAST_STEP: f64 = 0.03;
 
-/// Moves some vertices to where they are more comfortable, sweep by sweep, until they rest.
+/// Moves the given vertices to positions of lower cost, sweep by sweep, until none moves.
 ///
-/// A vertex whose `anchors` position is known is drawn there. Cost of a sweep: O(movable · (vertices + edges) · degree).
+/// A vertex is attracted to its position in `anchors`, if that is known. Cost of a sweep: O(movable · (vertices +
+/// edges) · degree).
 pub(super) fn smooth(graph: &Graph, points: &mut [Point], movable: &[usize], anchors: &[Point], sweeps: u32) {
     let mut steps = vec![FIRST_STEP; points.len()];
     for sweep in 0..sweeps {
@@ -30,7 +31,7 @@ pub(super) fn smooth(graph: &Graph, points: &mut [Point], movable: &[usize], anc
             match step(graph, points, vertex, anchors[vertex], steps[vertex], sweep) {
                 Some(at) => {
                     points[vertex] = at;
-                    // Its neighbours may be more comfortable elsewhere now.
+                    // The best positions of its neighbours may change.
                     let woken = |step: f64| step.max(2.0 * LAST_STEP);
                     graph.neighbours(vertex).iter().for_each(|&neighbour| steps[neighbour] = woken(steps[neighbour]));
                 }
@@ -43,7 +44,7 @@ pub(super) fn smooth(graph: &Graph, points: &mut [Point], movable: &[usize], anc
     }
 }
 
-/// Where a vertex is more comfortable than where it is.
+/// A position of lower cost for a vertex.
 fn step(graph: &Graph, points: &[Point], vertex: usize, anchor: Point, length: f64, sweep: u32) -> Option<Point> {
     let here = points[vertex];
     let cost = |at: Point, limit: f64| {
@@ -69,7 +70,7 @@ fn step(graph: &Graph, points: &[Point], vertex: usize, anchor: Point, length: f
     best
 }
 
-/// Ways towards the anchor and towards the neighbours, and short ways in four directions, others in every second sweep.
+/// Steps towards the anchor and the neighbours, and short steps in four directions that alternate between sweeps.
 fn candidates(
     graph: &Graph,
     points: &[Point],

@@ -1,4 +1,4 @@
-//! What holds of the picture of any map.
+//! Properties of the layout of any map.
 
 use std::collections::BTreeSet;
 use std::time::{Duration, Instant};
@@ -38,7 +38,7 @@ fn random_tree(vertices: u8, rng: &mut Xoshiro256PlusPlus) -> TopologicalMap {
     map(vertices, (1..vertices).map(|child| (rng.random_range(0..child), child)).collect::<Vec<_>>())
 }
 
-/// A random planar map: random edges, as long as it stays planar.
+/// A random planar map: adds random edges while the map stays planar.
 fn random_planar(vertices: u8, edges: usize, rng: &mut Xoshiro256PlusPlus) -> TopologicalMap {
     let points: Vec<Point> = (0..vertices).map(|_| Point::new(rng.random(), rng.random())).collect();
     let mut pairs: Vec<(u8, u8)> = (0..vertices).flat_map(|a| (0..a).map(move |b| (b, a))).collect();
@@ -54,7 +54,7 @@ fn random_planar(vertices: u8, edges: usize, rng: &mut Xoshiro256PlusPlus) -> To
     map(vertices, graph.edges().iter().map(|&(a, b)| (a as u8, b as u8)))
 }
 
-/// The map as a robot that walks at random comes to know it, update by update; vertices are numbered as they are found.
+/// The map as a random walk discovers it, update by update. Vertices are numbered in order of discovery.
 fn explored(map: &TopologicalMap, rng: &mut Xoshiro256PlusPlus) -> Vec<TopologicalMap> {
     let neighbours = map.neighbours();
     let (mut here, mut names) = (0, vec![0]);
@@ -108,7 +108,7 @@ fn samples() -> Vec<TopologicalMap> {
 }
 
 #[test]
-fn a_planar_map_that_comes_at_once_is_drawn_without_conflicts() {
+fn a_planar_map_arranged_at_once_is_drawn_without_conflicts() {
     for map in samples() {
         let mut layout = Layout::new();
         layout.arrange(&map);
@@ -116,14 +116,14 @@ fn a_planar_map_that_comes_at_once_is_drawn_without_conflicts() {
     }
 }
 
-/// What a map is without its last vertices.
+/// A map without its last vertices.
 fn first_vertices(map: &TopologicalMap, count: usize) -> TopologicalMap {
     let edges = map.edges.iter().copied().filter(|&(a, b)| usize::from(a.max(b)) < count);
     self::map(count as u8, edges)
 }
 
 #[test]
-fn a_planar_map_that_grows_is_drawn_without_conflicts_at_every_step() {
+fn a_growing_planar_map_is_drawn_without_conflicts_at_every_step() {
     let mut slowest = Duration::ZERO;
     for (seed, sample) in (0..).zip(samples()) {
         let mut layout = Layout::new();
@@ -138,7 +138,7 @@ fn a_planar_map_that_grows_is_drawn_without_conflicts_at_every_step() {
 }
 
 #[test]
-fn a_vertex_keeps_its_position_when_nothing_of_the_old_picture_conflicts() {
+fn a_vertex_keeps_its_position_without_conflicts() {
     let (mut updates, mut moved) = (0, 0);
     for (seed, sample) in (0..).zip(samples().iter().filter(|map| map.vertices.len() <= 16)) {
         let mut layout = Layout::new();
@@ -151,12 +151,12 @@ fn a_vertex_keeps_its_position_when_nothing_of_the_old_picture_conflicts() {
             }
         }
     }
-    // A vertex between several others may find no room, in rare cases.
+    // In rare cases there is no room for a vertex between several others.
     assert!(updates > 200 && 50 * moved <= updates, "{moved} of {updates}");
 }
 
 #[test]
-fn a_map_that_loses_edges_and_vertices_or_comes_again_keeps_its_picture() {
+fn an_unchanged_or_shrinking_map_keeps_its_layout() {
     let sample = random_planar(16, 24, &mut rng(3));
     let mut layout = Layout::new();
     layout.arrange(&sample);
@@ -175,11 +175,11 @@ fn a_map_that_loses_edges_and_vertices_or_comes_again_keeps_its_picture() {
 }
 
 #[test]
-fn a_vertex_with_another_number_keeps_its_position() {
+fn a_renumbered_vertex_keeps_its_position() {
     let mut layout = Layout::new();
     layout.arrange(&map(5, [(0, 1), (1, 2), (2, 3), (3, 4)]));
     let points = layout.points().to_vec();
-    // 1 is gone, 3 and 4 are one.
+    // 1 is removed, 3 and 4 are merged.
     layout.rename(&Remapped { place_index: 7, vertices: List::new([2, u8::MAX, 0, 1, 1]) });
     layout.arrange(&map(4, [(0, 1), (0, 2), (2, 3)]));
     assert_eq!(layout.points()[..3], [points[2], points[3], points[0]]);
@@ -187,14 +187,14 @@ fn a_vertex_with_another_number_keeps_its_position() {
 }
 
 #[test]
-fn merges_at_random_leave_no_conflicts() {
+fn random_merges_cause_no_conflicts() {
     let mut rng = rng(5);
     for _ in 0..20 {
         let mut map = random_tree(14, &mut rng);
         let mut layout = Layout::new();
         layout.arrange(&map);
         while map.vertices.len() > 3 {
-            // A leaf and its parent become one, which leaves a tree a tree.
+            // Merging a leaf with its parent leaves a tree.
             let last = map.vertices.len() as u8 - 1;
             let gone = (0..=last).find(|&vertex| map.neighbours()[usize::from(vertex)].len() == 1).unwrap();
             let parent = map.neighbours()[usize::from(gone)][0] as u8;
@@ -211,7 +211,7 @@ fn merges_at_random_leave_no_conflicts() {
 }
 
 #[test]
-fn the_same_maps_give_the_same_picture() {
+fn the_same_maps_give_the_same_layout() {
     let maps = explored(&random_planar(16, 22, &mut rng(9)), &mut rng(9));
     let picture = || {
         let mut layout = Layout::new();
@@ -222,7 +222,7 @@ fn the_same_maps_give_the_same_picture() {
 }
 
 #[test]
-fn edges_are_about_as_long_as_they_should_be() {
+fn the_mean_edge_length_is_about_one() {
     for (seed, sample) in [(0, grid(4, 4)), (1, grid(4, 3)), (2, wheel(7)), (3, random_tree(16, &mut rng(4)))] {
         let mut layout = Layout::new();
         let maps = explored(&sample, &mut rng(seed));
@@ -235,7 +235,7 @@ fn edges_are_about_as_long_as_they_should_be() {
 }
 
 #[test]
-fn a_map_that_is_not_planar_has_few_crossings_and_hides_nothing() {
+fn a_non_planar_map_has_few_crossings_and_no_overlaps() {
     let complete = |vertices: u8| map(vertices, (0..vertices).flat_map(|a| (0..a).map(move |b| (b, a))));
     let petersen = map(10, (0..5).flat_map(|i| [(i, (i + 1) % 5), (i, i + 5), (i + 5, 5 + (i + 2) % 5)]));
     let houses_and_wells = map(6, (0..3).flat_map(|house| (3..6).map(move |well| (house, well))));

@@ -1,25 +1,25 @@
-//! A drawing without crossings, cut into triangles by edges that are not there.
+//! Triangulation of a planar embedding by additional edges.
 
 use std::collections::HashMap;
 
 use super::{embedding, graph::Graph};
 
-/// A drawing without crossings all of whose faces are triangles, the outer one included.
+/// A planar embedding in which all faces, the outer one included, are triangles.
 pub(super) struct Triangulation {
-    /// The graph and the edges that were added to it.
+    /// The graph, including the added edges.
     pub(super) graph: Graph,
-    /// The face with the most edges, before it was cut.
+    /// The face with the most edges, before triangulation.
     pub(super) rim: Vec<usize>,
-    /// The outer face, a piece of that.
+    /// The outer face, a triangle of that face.
     pub(super) outer: [usize; 3],
-    /// For each edge and way the third vertex of the triangle on the side of that way.
+    /// For each directed edge the third vertex of the triangle on its side.
     third: HashMap<(usize, usize), usize>,
 }
 
 impl Triangulation {
-    /// `None` when the graph cannot be drawn without crossings, or has less than three vertices.
+    /// `None` if the graph is not planar or has fewer than three vertices.
     ///
-    /// One triangle of the face with the most edges is the outer one.
+    /// The outer face is a triangle of the face with the most edges.
     pub(super) fn of(graph: &Graph) -> Option<Self> {
         if graph.vertices() < 3 {
             return None;
@@ -37,16 +37,16 @@ impl Triangulation {
         Some(Self { graph, rim, outer, third: triangles.into_iter().flat_map(sides).collect() })
     }
 
-    /// The third vertex of the triangle that has this edge this way round.
+    /// The third vertex of the triangle that contains this directed edge.
     pub(super) fn third(&self, from: usize, to: usize) -> usize {
         self.third[&(from, to)]
     }
 }
 
-/// The graph with edges more, so that no vertex alone holds it together. It is planar if and only if it was.
+/// Makes the graph biconnected by adding edges. The result is planar if and only if the graph is.
 ///
-/// An edge between two parts never spoils that; nor does one between two neighbours of a vertex that alone holds their parts
-/// together, because each part can be drawn with its neighbour on the outside.
+/// An edge between two components preserves planarity. So does an edge between two neighbours of a cut vertex in
+/// different components, because each component can be embedded with its neighbour on the outer face.
 fn biconnected(graph: &Graph) -> Graph {
     let mut graph = graph.clone();
     for parts in graph.parts_without(&[]).windows(2) {
@@ -63,8 +63,8 @@ fn biconnected(graph: &Graph) -> Graph {
     graph
 }
 
-/// Cuts a face into triangles. Of two diagonals of a quadrangle one at most is drawn outside of it, so that there is always one to cut
-/// along; of those, the one between the vertices with the fewest edges is taken.
+/// Triangulates a face. At most one of the two diagonals of a quadrangle exists outside the face, so that one is always
+/// available; of the available ones, that between the vertices with the fewest edges is added.
 fn cut(graph: &mut Graph, mut face: Vec<usize>, triangles: &mut Vec<[usize; 3]>) {
     while face.len() > 3 {
         let around = |index: usize| {

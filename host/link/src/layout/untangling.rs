@@ -1,4 +1,4 @@
-//! Conflicts taken out of a picture by moving few vertices.
+//! Removes conflicts from a drawing by moving few vertices.
 
 use super::{
     Point,
@@ -8,15 +8,15 @@ use super::{
     placement::{self, Found, Search},
 };
 
-/// How much it weighs how far a vertex is moved.
+/// Weight of the distance that a vertex moves.
 const MOVE_WEIGHT: f64 = 0.5;
 
-/// At most so many moves are made, and none when there are more conflicts.
+/// Maximum number of moves; with more conflicts than this, none is made.
 const MOVES: usize = 12;
 const HOPELESS: u32 = 60;
 
-/// Moves one vertex after the other, always the one that takes most conflicts away, as long as that helps. Gives the conflicts that are
-/// left.
+/// Moves one vertex at a time, always the one that removes most conflicts, until no move helps. Returns the number of
+/// remaining conflicts.
 pub(super) fn untangle(graph: &Graph, points: &mut [Point]) -> u32 {
     let mut left = conflicts(graph, points);
     for _ in 0..MOVES {
@@ -34,7 +34,7 @@ pub(super) fn untangle(graph: &Graph, points: &mut [Point]) -> u32 {
     left
 }
 
-/// The best way to move a vertex that has conflicts, if any takes some away, and how much.
+/// The move of a vertex that removes most conflicts, and their number, if any move helps.
 fn best_move(graph: &Graph, points: &[Point], vertex: usize) -> Option<(usize, u32, Found)> {
     let here = points[vertex];
     let before = conflicts_of(graph, points, vertex, here, u32::MAX);

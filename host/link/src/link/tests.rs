@@ -1,4 +1,4 @@
-//! A link to a simulated robot on TCP.
+//! A link to a simulated robot over TCP.
 
 use std::net::SocketAddr;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -21,7 +21,7 @@ const OPTIONS: Options = Options {
     attempts: 1,
 };
 
-/// A robot that lives until it is dropped.
+/// A robot that runs until it is dropped.
 struct Robot {
     address: SocketAddr,
     ends: Arc<AtomicBool>,
@@ -64,7 +64,7 @@ fn link_to(address: SocketAddr, options: Options) -> (Link, Receiver<News>) {
 }
 
 fn wait_for<T>(news: &Receiver<News>, what: impl FnMut(News) -> Option<T>) -> T {
-    news.iter().find_map(what).expect("the link lives")
+    news.iter().find_map(what).expect("the link is running")
 }
 
 fn disconnected(news: News) -> Option<String> {
@@ -76,7 +76,7 @@ fn connected(news: News) -> Option<()> {
 }
 
 #[test]
-fn a_line_that_is_cut_is_opened_again_and_what_was_heard_stays() {
+fn a_cut_line_is_reopened_and_the_state_is_kept() {
     let robot = Robot::at("127.0.0.1:0");
     let address = robot.address;
     let (_link, news) = link_to(address, OPTIONS);
@@ -93,13 +93,13 @@ fn a_line_that_is_cut_is_opened_again_and_what_was_heard_stays() {
     let robot = Robot::at(&address.to_string());
     wait_for(&news, connected);
     let after = wait_for(&news, |news| if let News::Heard(_, listener) = news { Some(listener) } else { None });
-    assert!(after.counters().messages > messages, "the count goes on");
+    assert!(after.counters().messages > messages, "the count continues");
     wait_for(&news, edges(2));
     drop(robot);
 }
 
 #[test]
-fn a_robot_that_is_not_there_is_said_once_and_waited_for_and_told_nothing() {
+fn a_missing_robot_is_reported_once_and_retried_and_tasks_fail() {
     let robot = Robot::at("127.0.0.1:0");
     let address = robot.address;
     drop(robot);
@@ -119,7 +119,7 @@ fn a_robot_that_is_not_there_is_said_once_and_waited_for_and_told_nothing() {
 }
 
 #[test]
-fn tasks_are_done_and_refusals_come_back() {
+fn tasks_are_executed_and_refusals_are_returned() {
     let robot = Robot::at("127.0.0.1:0");
     let (link, news) = link_to(robot.address, OPTIONS);
     wait_for(&news, connected);
@@ -147,7 +147,7 @@ fn tasks_are_done_and_refusals_come_back() {
 }
 
 #[test]
-fn a_connection_on_which_nothing_comes_is_opened_anew() {
+fn a_silent_connection_is_reopened() {
     let mut silent = Broadcast::bind("127.0.0.1:0").unwrap();
     let options = Options { silence: Duration::from_millis(50), ..OPTIONS };
     let (_link, news) = link_to(silent.address().unwrap(), options);
@@ -159,7 +159,7 @@ fn a_connection_on_which_nothing_comes_is_opened_anew() {
 }
 
 #[test]
-fn a_link_that_is_dropped_lets_go_of_its_line() {
+fn dropping_a_link_closes_its_line() {
     let mut robot = Broadcast::bind("127.0.0.1:0").unwrap();
     let (link, news) = link_to(robot.address().unwrap(), OPTIONS);
     wait_for(&news, connected);
@@ -170,5 +170,5 @@ fn a_link_that_is_dropped_lets_go_of_its_line() {
     while robot.listeners() > 0 {
         robot.exchange(b"anyone?");
     }
-    assert!(news.iter().all(|news| matches!(news, News::Heard(Err(_), _))), "and then says nothing more");
+    assert!(news.iter().all(|news| matches!(news, News::Heard(Err(_), _))), "no other news after the drop");
 }

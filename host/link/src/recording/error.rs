@@ -1,4 +1,4 @@
-//! What can go wrong with a recording.
+//! Errors of recordings.
 
 use std::{fmt, io};
 
@@ -9,9 +9,9 @@ use mcap::McapError;
 pub enum RecordingError {
     /// The file cannot be opened, written or read.
     File(io::Error),
-    /// The file is not MCAP, or damaged.
+    /// The file is not MCAP, or is damaged.
     Mcap(McapError),
-    /// The file is a whole MCAP file, but nothing of it is from a robot's line.
+    /// The file is valid MCAP, but contains no frames of a robot.
     NoFrames,
 }
 

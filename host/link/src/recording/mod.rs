@@ -1,7 +1,7 @@
-//! Recordings of a robot's line as MCAP files, which Foxglove and Rerun open and from which everything can be heard again.
+//! Recordings of a robot's line as MCAP files, for replay and for the viewers Foxglove and Rerun.
 //!
-//! A recording holds every byte as it came, damaged ones too, each frame with the time of its arrival. Beside that it
-//! holds what was understood meanwhile, in the messages that viewers know; `docs/recording.md` lists the topics.
+//! A recording holds every received byte, damaged ones included, and the time of arrival of each frame. It also holds
+//! the decoded data as standard messages for viewers; `docs/recording.md` lists the topics.
 //!
 //! ```
 //! use toposlam::wire::{Encoder, MAX_FRAME_BYTES, Message};
@@ -39,11 +39,10 @@ pub use recorder::{Recorder, Summary};
 pub use scene::{MAP_FRAME, METRES_PER_EDGE, ROBOT_FRAME};
 pub use topics::Topic;
 
-/// The bytes of every frame of a recording, in the order in which they came; one after the other they are what the line
-/// brought.
+/// The bytes of each frame of a recording, in order of arrival. Their concatenation is the received stream.
 ///
 /// # Errors
-/// When the file cannot be opened; then each item as [`Recording`]'s.
+/// If the file cannot be opened; then each item as [`Recording`]'s.
 pub fn frames(path: &Path) -> Result<impl Iterator<Item = Result<Vec<u8>, RecordingError>> + use<>, RecordingError> {
     Ok(Recording::open(path)?.map(|frame| frame.map(|frame| frame.bytes)))
 }

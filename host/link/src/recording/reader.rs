@@ -1,4 +1,4 @@
-//! Reading a recording from its beginning, whether it was finished or not.
+//! Reads a recording from its beginning, finished or truncated.
 
 use std::fs::File;
 use std::io::{BufReader, ErrorKind, Read};
@@ -11,23 +11,23 @@ use prost::Message;
 
 use super::{RecordingError, Topic};
 
-/// A record longer than this is damage: memory stays bounded.
+/// Maximum length of a record, which bounds the memory; a longer one is damage.
 const RECORD_BYTES: usize = 1 << 24;
 const READ_BYTES: usize = 1 << 16;
 
-/// A frame of a recording.
+/// A recorded frame.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct TimedFrame {
-    /// When its last byte came, in nanoseconds since 1970.
+    /// Time of arrival of its last byte, in nanoseconds since 1970.
     pub time_ns: u64,
-    /// The frame as it came, up to and with its closing zero.
+    /// The received bytes, up to and including the terminating zero.
     pub bytes: Vec<u8>,
 }
 
-/// The frames of a recording, in the order in which they came.
+/// Iterator over the frames of a recording, in order of arrival.
 ///
-/// A file that was cut anywhere gives what is left of it and ends; [`Recording::is_cut`] then tells. Damage within the file is an
-/// error, and the last item. Memory: some 100 KiB, however long the file is.
+/// A truncated file yields its remaining frames and ends; [`Recording::is_cut`] is then true. Damage within the file is
+/// an error, and the last item. Memory: some 100 KiB for a file of any length.
 pub struct Recording<FILE> {
     file: FILE,
     reader: LinearReader,
@@ -47,21 +47,21 @@ impl Recording<BufReader<File>> {
     /// Opens a file.
     ///
     /// # Errors
-    /// When there is none or it may not be read.
+    /// If the file does not exist or cannot be read.
     pub fn open(path: &Path) -> Result<Self, RecordingError> {
         Ok(Self::new(BufReader::new(File::open(path)?)))
     }
 }
 
 impl<FILE: Read> Recording<FILE> {
-    /// Reads a file that is open.
+    /// Reads an open file.
     pub fn new(file: FILE) -> Self {
         let options =
             LinearReaderOptions::default().with_validate_chunk_crcs(true).with_record_length_limit(RECORD_BYTES);
         Self { file, reader: LinearReader::new_with_options(options), channel: None, state: State::Reading }
     }
 
-    /// Whether the file ended before its end, as one does whose recording was killed. To be asked after the last frame.
+    /// Whether the file is truncated, for example because its recording was killed. Valid after the last frame.
     pub const fn is_cut(&self) -> bool {
         matches!(self.state, State::Cut)
     }

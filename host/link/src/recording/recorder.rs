@@ -1,4 +1,4 @@
-//! Writing a recording while the line is listened to.
+//! Writes a recording while the line is received.
 
 use std::fs::File;
 use std::io::{BufWriter, Write};
@@ -16,53 +16,53 @@ use crate::layout::Layout;
 use crate::listener::{Event, Listener};
 use crate::topology::TopologicalMap;
 
-/// What has no end after this many bytes is no frame; it is written in pieces.
+/// Maximum length of a frame; a longer run without a terminator is written in pieces.
 const PIECE_BYTES: usize = 256;
-/// The map is drawn so often at most.
+/// Minimum interval between two scenes of the map.
 const DRAWING_PERIOD_NS: u64 = 100_000_000;
 
 const FAULT_KINDS: usize = FaultKind::ALL.len();
 
-/// Writes what a robot says into an MCAP file.
+/// Writes a robot's stream to an MCAP file.
 ///
-/// The file is kept in chunks of up to 256 KiB or five seconds, and each goes to the file as soon as it is whole: what was
-/// recorded before is readable whatever happens. Memory: a chunk, and some hundred bytes for each chunk that was
-/// written, for the index at the end of the file.
+/// The file consists of chunks of up to 256 KiB or five seconds. Each complete chunk is written at once, so all earlier
+/// data stay readable after a crash. Memory: one chunk, and some hundred bytes per written chunk for the index at the
+/// end of the file.
 pub struct Recorder<FILE: Write> {
     notes: Notes<FILE>,
     listener: Listener,
-    /// The frame that is not complete yet.
+    /// The incomplete frame.
     piece: Vec<u8>,
     newest_ns: u64,
     summary: Summary,
 }
 
-/// What a recording holds.
+/// Counts of a recording.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Summary {
-    /// Frames, damaged ones included.
+    /// Number of frames, damaged ones included.
     pub frames: u32,
-    /// Bytes of these frames.
+    /// Number of bytes of these frames.
     pub bytes: u64,
-    /// Places that the robot found meanwhile.
+    /// Number of places that the robot detected during the recording.
     pub places: u32,
 }
 
 impl Recorder<BufWriter<File>> {
-    /// Makes a file that does not exist yet.
+    /// Creates a new file.
     ///
     /// # Errors
-    /// When the file exists or cannot be written.
+    /// If the file exists or cannot be written.
     pub fn create(path: &Path) -> Result<Self, RecordingError> {
         Self::new(BufWriter::new(File::create_new(path)?))
     }
 }
 
 impl<FILE: Write> Recorder<FILE> {
-    /// Writes to a file that is open.
+    /// Writes to an open file.
     ///
     /// # Errors
-    /// When the file cannot be written.
+    /// If the file cannot be written.
     pub fn new(file: FILE) -> Result<Self, RecordingError> {
         Ok(Self {
             notes: Notes {
@@ -78,11 +78,11 @@ impl<FILE: Write> Recorder<FILE> {
         })
     }
 
-    /// Takes bytes as the line delivers them, in pieces of any length. `time_ns` is when they came, in nanoseconds since
-    /// 1970, and should not run backwards. A frame is written when its last byte has come, with the time of that.
+    /// Records bytes in pieces of any length. `time_ns` is their time of arrival in nanoseconds since 1970 and should
+    /// not decrease. A frame is written when its last byte arrives, with the time of that byte.
     ///
     /// # Errors
-    /// When the file cannot be written. It then ends with the last chunk that was whole.
+    /// If the file cannot be written. It then ends with the last complete chunk.
     pub fn hear(&mut self, bytes: &[u8], time_ns: u64) -> Result<(), RecordingError> {
         self.newest_ns = time_ns;
         for &byte in bytes {
@@ -110,20 +110,20 @@ impl<FILE: Write> Recorder<FILE> {
         written
     }
 
-    /// What was heard so far.
+    /// The state of the robot so far.
     pub const fn listener(&self) -> &Listener {
         &self.listener
     }
 
-    /// What was recorded so far.
+    /// The counts so far.
     pub const fn summary(&self) -> Summary {
         self.summary
     }
 
-    /// Writes what is left and the index, which makes the file quick to open.
+    /// Writes the remaining data and the index, which lets viewers open the file quickly.
     ///
     /// # Errors
-    /// When the file cannot be written.
+    /// If the file cannot be written.
     pub fn finish(mut self) -> Result<Summary, RecordingError> {
         let time_ns = self.newest_ns;
         if !self.piece.is_empty() {
@@ -135,7 +135,7 @@ impl<FILE: Write> Recorder<FILE> {
     }
 }
 
-/// What is written beside the frames.
+/// State of the topics beside the frames.
 struct Notes<FILE: Write> {
     topics: Topics<FILE>,
     layout: Layout,
@@ -144,7 +144,7 @@ struct Notes<FILE: Write> {
     faults: [u32; FAULT_KINDS],
 }
 
-/// The map as it was drawn last.
+/// The map in its last scene.
 struct Drawn {
     map: TopologicalMap,
     robot: Option<u8>,
@@ -170,7 +170,7 @@ impl<FILE: Write> Notes<FILE> {
         if let Message::Fault { kind, count } = message { self.fault(*kind, *count, time_ns) } else { Ok(()) }
     }
 
-    /// The robot repeats its counts; only one that has grown is told.
+    /// The robot repeats its counts; only an increase is logged.
     fn fault(&mut self, kind: u8, count: u32, time_ns: u64) -> Result<(), RecordingError> {
         let known = self.faults.get_mut(usize::from(kind));
         if known.as_deref() == Some(&count) {

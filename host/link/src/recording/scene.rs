@@ -1,4 +1,4 @@
-//! The map and the ring in the messages of Foxglove's viewer.
+//! The map and the ring as Foxglove messages.
 
 use std::f64::consts::TAU;
 
@@ -12,16 +12,16 @@ use toposlam::wire::Echoes;
 use crate::layout::Point;
 use crate::topology::{TopologicalMap, Vertex};
 
-/// The frame of reference of the map's picture.
+/// Frame of reference of the map's drawing.
 pub const MAP_FRAME: &str = "map";
-/// The frame of reference of the sonar ring.
+/// Frame of reference of the sonar ring.
 pub const ROBOT_FRAME: &str = "robot";
-/// How long an edge of the layout is drawn, so that free discs of up to twice 1.5 m beside each other do not touch.
+/// Length of an edge in the scene. Adjacent discs with radii up to 1.5 m do not overlap.
 pub const METRES_PER_EDGE: f64 = 3.0;
 
 const EDGE_THICKNESS_M: f64 = 0.05;
 const DISC_HEIGHT_M: f64 = 0.02;
-/// What is drawn of a vertex whose radius was not heard yet.
+/// Radius drawn for a vertex whose radius is not yet received.
 const UNHEARD_RADIUS_M: f64 = 0.1;
 const LOOP_RADIUS_M: f64 = 0.6;
 const LOOP_CORNERS: u32 = 24;
@@ -33,7 +33,7 @@ const ROBOT_ORANGE: Color = Color { r: 1.0, g: 0.55, b: 0.1, a: 0.9 };
 const EDGE_GREY: Color = Color { r: 0.6, g: 0.6, b: 0.6, a: 1.0 };
 const TEXT_WHITE: Color = Color { r: 1.0, g: 1.0, b: 1.0, a: 1.0 };
 
-/// A map with the positions of its vertices and the vertex at which the robot is.
+/// A map with the positions of its vertices and the robot's vertex.
 #[derive(Clone, Copy)]
 pub(super) struct Scene<'map> {
     pub(super) map: &'map TopologicalMap,
@@ -56,7 +56,7 @@ impl Scene<'_> {
         Pose { position: Some(self.position(vertex, z)), orientation: Some(UPRIGHT) }
     }
 
-    /// The whole map as one entity, which replaces the one before.
+    /// The whole map as one entity, which replaces the previous one.
     pub(super) fn update(&self, time_ns: u64) -> SceneUpdate {
         let vertices = || self.map.vertices.iter().enumerate();
         let entity = SceneEntity {
@@ -125,7 +125,7 @@ impl Scene<'_> {
             .collect()
     }
 
-    /// Where each vertex is, in the order of their numbers.
+    /// Position of each vertex, in order of vertex numbers.
     pub(super) fn vertices(&self, time_ns: u64) -> PosesInFrame {
         PosesInFrame {
             timestamp: Some(timestamp(time_ns)),
@@ -134,7 +134,7 @@ impl Scene<'_> {
         }
     }
 
-    /// The robot's frame at the vertex where it is; at the middle of the picture while that is not known.
+    /// The robot's frame at its vertex; at the origin of the drawing while the vertex is unknown.
     pub(super) fn transform(&self, time_ns: u64) -> FrameTransform {
         FrameTransform {
             timestamp: Some(timestamp(time_ns)),
@@ -146,7 +146,7 @@ impl Scene<'_> {
     }
 }
 
-/// A ring whose sonars are spaced evenly, the first one straight ahead. Silence is +∞ and a dead sonar NaN, as REP 117 has it.
+/// A ring of evenly spaced sonars, the first straight ahead. Silence is +∞ and a dead sonar NaN, as in REP 117.
 pub(super) fn scan(echoes: &Echoes, time_ns: u64) -> LaserScan {
     let range_m = |echo| match echo {
         Echo::Range { range_mm } => metres(range_mm),
@@ -177,7 +177,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn every_vertex_is_a_disc_of_its_radius_and_the_robots_has_another_colour() {
+    fn each_vertex_is_a_disc_of_its_radius_and_the_robots_vertex_is_highlighted() {
         let vertices = [1200, 0].map(|radius_mm| Vertex { radius_mm, visits: 1 }).to_vec();
         let map = TopologicalMap { vertices, edges: vec![(0, 1), (1, 1)] };
         let points = [Point { x: 0.0, y: 0.0 }, Point { x: 1.0, y: -1.0 }];
@@ -197,7 +197,7 @@ mod tests {
     }
 
     #[test]
-    fn silence_is_infinitely_far_and_a_dead_sonar_is_not_a_number() {
+    fn silence_is_infinity_and_a_dead_sonar_is_nan() {
         let echoes = Echoes::new(&[Echo::Range { range_mm: 1500 }, Echo::Silence, Echo::Dead, Echo::Silence]);
         let scan = scan(&echoes, 0);
         assert_eq!((scan.ranges[0], scan.ranges[1], scan.ranges[2].is_nan()), (1.5, f64::INFINITY, true));

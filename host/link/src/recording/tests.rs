@@ -1,4 +1,4 @@
-//! What is recorded is what came, and is there again however the file ends.
+//! A recording holds exactly the received bytes, and stays readable after any interruption.
 
 use std::collections::BTreeMap;
 use std::sync::LazyLock;
@@ -17,7 +17,7 @@ use toposlam_sim::world::{Plan, RobotModel};
 
 const SECOND_NS: u64 = 1_000_000_000;
 
-/// The bytes of each turn of an exploration, and the robot's map after it.
+/// The bytes of each turn of an exploration, and the robot's final map.
 struct Drive {
     turns: Vec<Vec<u8>>,
     map: TopologicalMap,
@@ -51,7 +51,7 @@ fn recorded(turns: &[Vec<u8>]) -> Vec<u8> {
     file
 }
 
-/// Everything that a listener knows after each event.
+/// The state of a listener after each event.
 fn heard<'bytes>(pieces: impl Iterator<Item = &'bytes [u8]>) -> Vec<String> {
     let mut listener = Listener::new();
     let mut states = Vec::new();
@@ -65,7 +65,7 @@ fn read(file: &[u8]) -> Vec<TimedFrame> {
     Recording::new(file).collect::<Result<_, _>>().unwrap()
 }
 
-/// The messages on a topic, as the file has them.
+/// The messages of a topic in the file.
 fn on(file: &[u8], topic: Topic) -> Vec<Vec<u8>> {
     let messages = mcap::MessageStream::new(file).unwrap().map(Result::unwrap);
     messages.filter(|message| message.channel.topic == topic.name()).map(|message| message.data.into_owned()).collect()
@@ -77,7 +77,7 @@ fn encoded(messages: &[Message]) -> Vec<u8> {
 }
 
 #[test]
-fn a_recording_tells_the_same_map_as_the_line_bit_for_bit_after_each_message() {
+fn a_recording_reproduces_the_live_state_after_each_message() {
     let drive = &DRIVE;
     let frames = read(&recorded(&drive.turns));
     let live = heard(drive.turns.iter().map(Vec::as_slice));
@@ -97,7 +97,7 @@ fn a_recording_tells_the_same_map_as_the_line_bit_for_bit_after_each_message() {
 }
 
 #[test]
-fn damaged_bytes_are_kept_as_they_came_with_the_time_at_which_their_frame_ended() {
+fn damaged_bytes_are_recorded_unchanged_with_the_end_time_of_their_frame() {
     let mut turns = DRIVE.turns.clone();
     for (turn, bytes) in turns.iter_mut().enumerate() {
         if turn % 7 == 0 && bytes.len() > 3 {
@@ -120,7 +120,7 @@ fn damaged_bytes_are_kept_as_they_came_with_the_time_at_which_their_frame_ended(
 }
 
 #[test]
-fn a_file_that_was_cut_anywhere_gives_the_frames_before_the_cut() {
+fn a_truncated_file_yields_the_frames_before_the_cut() {
     let file = recorded(&DRIVE.turns[..300]);
     let whole = read(&file);
     let mut read_before = 0;
@@ -138,7 +138,7 @@ fn a_file_that_was_cut_anywhere_gives_the_frames_before_the_cut() {
     assert!(!recording.is_cut());
 }
 
-/// A file that is lost at some time, like that of a program that is killed.
+/// A file that fails after some time, as if the program had been killed.
 struct Lost<'file>(&'file mut Vec<u8>);
 
 impl std::io::Write for Lost<'_> {
@@ -153,7 +153,7 @@ impl std::io::Write for Lost<'_> {
 }
 
 #[test]
-fn a_recording_that_is_killed_lacks_five_seconds_at_most() {
+fn a_killed_recording_loses_at_most_five_seconds() {
     let turns = &DRIVE.turns[..300];
     let mut file = Vec::new();
     let mut recorder = Recorder::new(Lost(&mut file)).unwrap();
@@ -168,7 +168,7 @@ fn a_recording_that_is_killed_lacks_five_seconds_at_most() {
 }
 
 #[test]
-fn damage_within_a_file_is_an_error_and_no_end() {
+fn damage_within_a_file_is_an_error_not_the_end() {
     let mut file = recorded(&DRIVE.turns[..100]);
     let frame = &read(&file)[40].bytes;
     let at = file.windows(frame.len()).position(|window| window == frame).unwrap();
@@ -178,7 +178,7 @@ fn damage_within_a_file_is_an_error_and_no_end() {
 }
 
 #[test]
-fn a_file_of_something_else_is_refused() {
+fn a_file_of_another_format_is_refused() {
     let text = Recording::new(&b"not a recording, but a text"[..]).next().unwrap();
     assert!(matches!(text, Err(RecordingError::Mcap(mcap::McapError::BadMagic))), "{text:?}");
     let mut foreign = std::io::Cursor::new(Vec::new());
@@ -192,7 +192,7 @@ fn a_file_of_something_else_is_refused() {
 }
 
 #[test]
-fn the_ring_a_growing_fault_and_a_map_that_changes_are_written_for_viewers() {
+fn viewer_topics_get_ring_frames_new_faults_and_map_changes() {
     let echoes = Echoes::new(&[Echo::Range { range_mm: 1500 }, Echo::Silence, Echo::Dead]);
     let fault = |count| Message::Fault { kind: 0, count };
     let messages = [

@@ -1,4 +1,4 @@
-//! The topics of a recording: their names, their schemas, and the file that they are written to.
+//! The topics of a recording: their names, their schemas, and the output file.
 
 use std::{collections::BTreeMap, io::Write};
 
@@ -13,15 +13,15 @@ use serde_json::Value;
 
 use super::RecordingError;
 
-/// A chunk of the file ends when it has lasted this long: a recording that is killed lacks no more than that.
+/// Maximum duration of a chunk: a killed recording loses no more than this.
 const CHUNK_NS: u64 = 5_000_000_000;
-/// A chunk, which is kept in memory until it ends, ends when it is larger than this.
+/// Maximum size of a chunk, which is buffered in memory until it is complete.
 const CHUNK_BYTES: u64 = 1 << 18;
 
 /// A topic of a recording.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Topic {
-    /// The frames as they came.
+    /// Frames as received.
     Frames,
     /// Ranges of the sonar ring.
     Ring,
@@ -29,16 +29,16 @@ pub enum Topic {
     Map,
     /// Positions of the map's vertices.
     Vertices,
-    /// Where the robot is in the map.
+    /// The robot's position in the map.
     Transform,
-    /// What the robot said, but for the ring.
+    /// All messages except ring frames.
     Events,
     /// Faults.
     Log,
 }
 
 impl Topic {
-    /// Every topic.
+    /// All topics.
     pub const ALL: [Self; 7] =
         [Self::Frames, Self::Ring, Self::Map, Self::Vertices, Self::Transform, Self::Events, Self::Log];
 
@@ -74,7 +74,7 @@ impl Topic {
     }
 }
 
-/// `message Frame { bytes data = 1; }`, which is what `prost` makes of a `Vec<u8>`.
+/// `message Frame { bytes data = 1; }`, the message that `prost` derives for a `Vec<u8>`.
 fn frame_descriptor() -> Vec<u8> {
     let data = FieldDescriptorProto {
         name: Some("data".to_owned()),
@@ -103,7 +103,7 @@ pub(super) struct Topics<FILE: Write> {
 
 impl<FILE: Write> Topics<FILE> {
     pub(super) fn create(file: FILE) -> Result<Self, RecordingError> {
-        // Without seeking, a chunk goes to the file at once and whole.
+        // Without seeking, a complete chunk is written at once.
         let options = WriteOptions::new()
             .library(concat!("toposlam ", env!("CARGO_PKG_VERSION")))
             .chunk_size(Some(CHUNK_BYTES))

@@ -1,4 +1,4 @@
-//! What the robot believes, and why.
+//! The robot's beliefs and their evidence.
 
 use ratatui::Frame;
 use ratatui::layout::Rect;

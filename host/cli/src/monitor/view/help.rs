@@ -1,4 +1,4 @@
-//! The keys.
+//! The help pane: the keys.
 
 use ratatui::Frame;
 use ratatui::layout::Rect;

@@ -1,4 +1,4 @@
-//! The map as a picture.
+//! The map as a drawing.
 
 use ratatui::Frame;
 use ratatui::layout::Rect;
@@ -13,9 +13,9 @@ use super::{FAINT, HERE};
 use crate::monitor::model::Model;
 use toposlam_link::layout::Point;
 
-/// What is free around the vertices, where an edge is about 1 long.
+/// Margin around the vertices, in units of about one edge length.
 const MARGIN: f64 = 0.5;
-/// The circle of the widest place, and what any circle has at least.
+/// Circle radius of the widest place, and the minimum radius.
 const WIDEST: f64 = 0.22;
 const LEAST: f64 = 0.08;
 
@@ -86,13 +86,13 @@ fn is_here(model: &Model, number: usize) -> bool {
     model.watch().listener().replica().location().is_some_and(|location| usize::from(location.vertex) == number)
 }
 
-/// Whether the walk that explains the worst n-gram goes along this edge.
+/// Whether the walk that explains the worst n-gram uses this edge.
 fn is_worst(model: &Model, a: u8, b: u8) -> bool {
     let Some(worst) = model.watch().listener().replica().worst() else { return false };
     worst.vertices.as_slice().windows(2).any(|step| *step == [a, b] || *step == [b, a])
 }
 
-/// What part of the plane is seen, so that all points are in it and a circle is round: a cell is twice as high as wide.
+/// The visible part of the plane: contains all points and keeps circles round, as a cell is twice as high as wide.
 fn bounds(points: &[Point], area: Rect) -> ([f64; 2], [f64; 2]) {
     let (width, height) = (f64::from(area.width.max(1)), 2.0 * f64::from(area.height.max(1)));
     let range = |of: fn(&Point) -> f64| {
@@ -101,7 +101,7 @@ fn bounds(points: &[Point], area: Rect) -> ([f64; 2], [f64; 2]) {
         if least <= most { (f64::midpoint(least, most), most - least) } else { (0.0, 0.0) }
     };
     let ((x, wide), (y, high)) = (range(|point| point.x), range(|point| point.y));
-    // The labels stand to the right of their vertices.
+    // The labels are to the right of their vertices.
     let per_cell = ((wide + 2.0 * MARGIN) / (width - 10.0).max(1.0)).max((high + 2.0 * MARGIN) / height);
     let centre = x + 4.0 * per_cell;
     (
@@ -115,7 +115,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn all_points_are_seen_and_circles_are_round() {
+    fn all_points_are_visible_and_circles_are_round() {
         let points = [Point { x: -3.0, y: 1.0 }, Point { x: 2.0, y: 9.0 }];
         for (width, height) in [(46, 15), (100, 10), (20, 60), (1, 1), (0, 0)] {
             let ([left, right], [bottom, top]) = bounds(&points, Rect::new(0, 0, width, height));

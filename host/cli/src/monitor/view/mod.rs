@@ -1,7 +1,7 @@
-//! The model on a frame, a file for each pane. Nothing here changes the model, and any size of the frame will do.
+//! Draws the model on a frame of any size, one file per pane. The view does not change the model.
 //!
-//! From 110 columns and 34 rows on, all panes are there; from 60 and 14 on, one of them beside what the robot believes and
-//! does; below that only the one.
+//! From 110 columns and 34 rows all panes are visible; from 60 and 14 the selected pane beside beliefs and robot; below
+//! that only the selected pane.
 
 mod beliefs;
 mod help;
@@ -20,7 +20,7 @@ use super::model::{Model, Pane};
 use toposlam_link::listener::Understanding;
 use toposlam_link::watch::Connection;
 
-/// A robot sends several messages a second; this long without one is worth a word.
+/// Silence of a robot after which a warning is shown; it normally sends several messages per second.
 const QUIET_SECONDS: f64 = 3.0;
 
 const GOOD: Style = Style::new().fg(Color::Green);
@@ -30,7 +30,7 @@ const HERE: Style = Style::new().fg(Color::Yellow).add_modifier(Modifier::BOLD);
 const ALARM: Style = Style::new().fg(Color::White).bg(Color::Red).add_modifier(Modifier::BOLD);
 const WARNING: Style = Style::new().fg(Color::Black).bg(Color::Yellow);
 
-/// Draws the model, which should have been settled, see [`Model::settle`].
+/// Draws the model. Call [`Model::settle`] first.
 pub fn draw(frame: &mut Frame<'_>, model: &Model) {
     let area = frame.area();
     let banners = banners(model, area.width);
@@ -111,7 +111,7 @@ fn heading(model: &Model) -> Line<'_> {
     Line::from(vec![Span::from(format!("{name} ")), connection, Span::from(size), whole])
 }
 
-/// What whoever looks must know before anything else, with the rows that each takes.
+/// Warnings at the top of the screen, each with its number of rows.
 fn banners(model: &Model, width: u16) -> Vec<(Paragraph<'_>, u16)> {
     let mut texts = Vec::new();
     if let Connection::Cut(reason) = model.watch().connection() {
@@ -164,7 +164,7 @@ fn log(frame: &mut Frame<'_>, area: Rect, model: &Model) {
     frame.render_widget(Paragraph::new(lines).block(block), area);
 }
 
-/// A paragraph in a box, its lines broken where they are too long.
+/// A paragraph in a box, with wrapped lines.
 fn boxed(frame: &mut Frame<'_>, area: Rect, title: &str, lines: Vec<Line<'_>>) {
     let block = Block::bordered().title(title);
     frame.render_widget(Paragraph::new(lines).wrap(Wrap { trim: true }).block(block), area);

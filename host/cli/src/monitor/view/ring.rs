@@ -1,7 +1,7 @@
-//! The newest ring frame seen from above, and where the drive heads: ahead is up.
+//! The newest ring frame from above, with the heading of the drive; ahead is up.
 //!
-//! The wire tells how many sonars a ring has and not how they are mounted. They are drawn at even spacing, the first one
-//! straight ahead, counter-clockwise, as `RingGeometry::even` has them.
+//! The protocol sends the number of sonars, but not their mounting. They are drawn at even spacing, the first straight
+//! ahead, counter-clockwise, as in `RingGeometry::even`.
 
 use std::f64::consts::{FRAC_PI_2, TAU};
 
@@ -17,7 +17,7 @@ use toposlam::ring::Echo;
 use super::{BAD, FAINT};
 use crate::monitor::model::Model;
 
-/// The range at the rim when no sonar hears anything nearer to or farther from it.
+/// Minimum range at the rim; a farther echo increases it.
 const LEAST_RANGE_MM: f64 = 500.0;
 
 pub(super) fn draw(frame: &mut Frame<'_>, area: Rect, model: &Model) {
@@ -75,7 +75,7 @@ fn paint(context: &mut Context<'_>, model: &Model, echoes: &[Echo], range_mm: f6
     }
 }
 
-/// How many sonars the ring has, as far as anyone has said.
+/// Number of sonars of the ring, if received.
 fn sonars(model: &Model, echoes: usize) -> usize {
     let told = model.watch().listener().replica().hello().map_or(0, |hello| usize::from(hello.capacities.sonars));
     told.max(echoes).max(1)
@@ -89,7 +89,7 @@ fn farthest_mm(echoes: &[Echo]) -> f64 {
     ranges.fold(LEAST_RANGE_MM, f64::max)
 }
 
-/// A point in that direction, counter-clockwise from ahead, at that distance; ahead is up.
+/// A point at a bearing, counter-clockwise from ahead, and a distance; ahead is up.
 fn towards(bearing: f64, distance: f64) -> (f64, f64) {
     let angle = bearing + FRAC_PI_2;
     (distance * angle.cos(), distance * angle.sin())
@@ -104,6 +104,6 @@ mod tests {
         let (x, y) = towards(0.0, 2.0);
         assert!(x.abs() < 1e-9 && (y - 2.0).abs() < 1e-9);
         let (x, y) = towards(FRAC_PI_2, 2.0);
-        assert!((x + 2.0).abs() < 1e-9 && y.abs() < 1e-9, "a quarter turn to the left is on the left");
+        assert!((x + 2.0).abs() < 1e-9 && y.abs() < 1e-9, "a bearing of +90° is on the left");
     }
 }

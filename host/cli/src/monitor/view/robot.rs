@@ -1,4 +1,4 @@
-//! What the robot does and how it is, and how well it is heard.
+//! The state of the robot and of its line.
 
 use ratatui::Frame;
 use ratatui::layout::Rect;

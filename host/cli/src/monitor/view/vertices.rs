@@ -38,7 +38,7 @@ pub(super) fn draw(frame: &mut Frame<'_>, area: Rect, model: &Model) {
     frame.render_widget(table, area);
 }
 
-/// The probability that the robot is at a vertex, in thousandths, when it was told.
+/// Probability that the robot is at a vertex, in thousandths, if received.
 pub(super) fn permille_at(model: &Model, number: usize) -> Option<u16> {
     let belief = model.watch().listener().replica().belief()?;
     let place = belief.vertices.as_slice().iter().find(|place| usize::from(place.vertex) == number)?;
