@@ -1,4 +1,4 @@
-//! Any bytes and any requests to a robot, whose main loop turns at any moment between them.
+//! Arbitrary bytes and requests to a robot, with turns of its main loop at arbitrary points between them.
 #![no_main]
 
 #[path = "commands/expected.rs"]
@@ -20,12 +20,12 @@ use toposlam::{FaultKind, Filter, RobustFilter};
 use toposlam_fuzz::filters::{self, CONFIG, HYPOTHESES, Small};
 use toposlam_fuzz::line::{Line, Piece, damage};
 
-/// Room for a snapshot with most of the hypotheses, and less than a snapshot may claim to need.
+/// Room for a snapshot with most of the hypotheses; smaller than the largest announced length.
 const STAGING_BYTES: usize = Small::SNAPSHOT_BYTES - 50;
 
-/// How many places the robot has seen when the first bytes arrive.
+/// The number of places observed before the first bytes arrive.
 const PLACES: usize = 20;
-/// The filter takes most of the time, and is not what is fuzzed.
+/// The filter takes most of the time and is not under test.
 const TURNS_PER_PLACE: usize = 4;
 
 #[derive(Arbitrary, Debug)]
@@ -34,17 +34,17 @@ enum Step<'a> {
     Turn,
     /// A request arrives.
     Ask { id: u8, told: Told<'a> },
-    /// The bytes that came last come again.
+    /// The last bytes are repeated.
     Again,
-    /// A request arrives with one byte changed.
+    /// A request with one changed byte arrives.
     Damaged { id: u8, told: Told<'a>, at: u8, with: u8 },
-    /// Anything else arrives.
+    /// Arbitrary bytes arrive.
     Line(Piece<'a>),
-    /// The robot's own snapshot is sent back to it, in pieces with a turn each, some bytes changed; its CRC is right or not.
+    /// The robot's own snapshot is sent back in chunks, one per turn, with changed bytes and a valid or invalid CRC.
     Restore { edits: Vec<(u16, u8)>, crc_error: u8, left_out: Option<u8> },
 }
 
-/// The commands, as they may be told.
+/// The commands with arbitrary values.
 #[derive(Arbitrary, Clone, Copy, Debug)]
 enum Told<'a> {
     Info,
@@ -56,7 +56,7 @@ enum Told<'a> {
         length: u16,
         crc: u32,
     },
-    /// Announces the bytes that a following piece at 0 may carry.
+    /// Announces the bytes that a following chunk at offset 0 may carry.
     RestoreOf {
         bytes: &'a [u8],
     },
@@ -158,13 +158,13 @@ fn restore(robot: &mut Robot<'_>, client: &mut Client, edits: &[(u16, u8)], crc_
     }
 }
 
-/// Who sends.
+/// The sender.
 #[derive(Default)]
 struct Client {
     line: Line,
     /// Bytes that the robot has not received.
     under_way: Vec<u8>,
-    /// What was sent last.
+    /// The last bytes sent.
     last: Vec<u8>,
 }
 
@@ -178,7 +178,7 @@ impl Client {
     }
 }
 
-/// The main loop of a robot in small, and what is expected of it.
+/// A minimal main loop and its expected behaviour.
 struct Robot<'buffer> {
     inbox: Inbox,
     staging: Staging<'buffer>,
@@ -191,7 +191,7 @@ struct Robot<'buffer> {
     expected: Expected,
 }
 
-/// A robot that has seen some places.
+/// A robot that has observed some places.
 static DRIVEN: LazyLock<Box<Small>> = LazyLock::new(|| filters::after(PLACES));
 
 impl<'buffer> Robot<'buffer> {
@@ -209,7 +209,7 @@ impl<'buffer> Robot<'buffer> {
         }
     }
 
-    /// One turn of the main loop with the bytes that came since the last one.
+    /// Runs one turn of the main loop with the bytes received since the last one.
     fn turn(&mut self, bytes: &[u8]) {
         let due = self.expected.receive(bytes);
         bytes.iter().for_each(|&byte| self.inbox.take(byte));
@@ -301,7 +301,7 @@ impl<'buffer> Robot<'buffer> {
         let before = filters::saved(&mut self.filter);
         match self.filter.restore(section) {
             Ok(()) => {
-                // The snapshot brings its own settings, 255 moves at a place among them.
+                // The snapshot includes settings, with up to 255 moves at a place.
                 if filters::moves(&mut self.filter) > 3 {
                     self.filter = DRIVEN.clone();
                 }
@@ -319,7 +319,7 @@ impl<'buffer> Robot<'buffer> {
         assert_eq!(RobustFilter::<4, 8, 40>::new().start(settings.filter, 1), Ok(()));
         assert_eq!(PlaceDetector::new().start(settings.place, RING), Ok(()));
         assert!((1..=1000).contains(&settings.speed_permille));
-        // So many moves are allowed, and would be all that is fuzzed.
+        // More moves are valid, but would take most of the fuzzing time.
         if settings.filter.moves <= 3 {
             self.settings = settings;
         }

@@ -1,4 +1,4 @@
-//! Any bytes for a snapshot, with a right checksum or without, and true snapshots that were changed.
+//! Arbitrary bytes as a snapshot, with a valid or invalid CRC, and mutated snapshots.
 #![no_main]
 
 use std::sync::LazyLock;
@@ -11,27 +11,27 @@ use toposlam::persist::snapshot::{FILTER_SECTION, SNAPSHOT_VERSION, SnapshotErro
 use toposlam::wire::crc32;
 use toposlam_fuzz::filters::{self, Seen, Small};
 
-/// How much happens behind a restore at most, before the last place.
+/// The most steps after a restore, before the last place.
 const STEPS: usize = 30;
 
 #[derive(Arbitrary, Debug)]
 struct Input<'a> {
     source: Source<'a>,
-    /// What happens behind the restore.
+    /// The steps after the restore.
     then: Vec<Then>,
 }
 
 #[derive(Arbitrary, Debug)]
 enum Source<'a> {
-    /// A true snapshot's contents, changed; the checksum is right.
+    /// Mutated contents of a valid snapshot; the CRC is valid.
     Changed { which: u8, edits: Edits<'a> },
-    /// The contents of the filter's section.
+    /// Arbitrary contents of the filter's section.
     Contents(&'a [u8]),
-    /// All sections; header and checksum are right.
+    /// Arbitrary sections; header and CRC are valid.
     Sections(&'a [u8]),
-    /// The whole.
+    /// Arbitrary bytes.
     Whole(&'a [u8]),
-    /// A true snapshot whose checksum does not follow the changes.
+    /// A mutated snapshot whose CRC is not updated.
     Damaged { which: u8, edits: Edits<'a> },
 }
 
@@ -42,7 +42,7 @@ enum Then {
     LocaliseOnly(bool),
 }
 
-/// One change at least: a snapshot without any takes longest and shows least.
+/// At least one change: an unchanged snapshot takes the longest and tests the least.
 #[derive(Arbitrary, Debug)]
 struct Edits<'a> {
     first: Edit<'a>,
@@ -59,7 +59,7 @@ enum Edit<'a> {
         at: u16,
         what: i8,
     },
-    /// Half a byte: a path has two places in one.
+    /// Changes half a byte: a path has two places per byte.
     Xor {
         at: u16,
         half: bool,
@@ -78,7 +78,7 @@ enum Edit<'a> {
     },
 }
 
-/// True snapshots: of filters that saw nothing, little, more than they remember, that know a map, and that only localise.
+/// Valid snapshots of filters: empty, with a short and with a full history, with a known map, and only localising.
 static TRUE: LazyLock<Vec<Vec<u8>>> = LazyLock::new(|| {
     let mut localising = filters::after(30);
     localising.set_localise_only(true);
@@ -95,7 +95,7 @@ static TRUE: LazyLock<Vec<Vec<u8>>> = LazyLock::new(|| {
         .into()
 });
 
-/// A filter that goes on with a snapshot, or without.
+/// A filter after it restored or refused a snapshot.
 static BEFORE: LazyLock<Box<Small>> = LazyLock::new(|| filters::after(12));
 
 fuzz_target!(|input: Input<'_>| {
@@ -108,10 +108,10 @@ fuzz_target!(|input: Input<'_>| {
         assert_ne!(error, SnapshotError::Full);
         assert_eq!(filters::saved(&mut filter), before, "a refused snapshot changes nothing");
         assert_eq!(filter.observe(filters::walk(12)), twin.observe(filters::walk(12)));
-        assert_eq!(filters::saved(&mut filter), filters::saved(&mut twin), "nor what comes later");
+        assert_eq!(filters::saved(&mut filter), filters::saved(&mut twin), "a refused snapshot has no later effect");
         return;
     }
-    goes_on(&mut filter, &input.then);
+    exercise(&mut filter, &input.then);
 });
 
 /// The snapshot that is restored.
@@ -168,18 +168,18 @@ fn edited(bytes: &[u8], edits: &Edits<'_>) -> Vec<u8> {
     bytes
 }
 
-/// Whatever a snapshot said, the filter is one that can go on.
-fn goes_on(filter: &mut Small, then: &[Then]) {
+/// Asserts that the filter is usable after any snapshot.
+fn exercise(filter: &mut Small, then: &[Then]) {
     filters::check_map(filter);
     let mut twin = again(filter);
-    // Up to 255 moves at a place are allowed, and would be all that is fuzzed.
+    // Up to 255 moves at a place are valid, but would take most of the fuzzing time.
     let steps = 4 * STEPS / (4 + usize::from(filters::moves(filter)));
     for then in then.iter().take(steps).chain([&Then::Place(Seen::PLAIN)]) {
         match *then {
             Then::Place(seen) => {
                 let update = filter.observe(seen.observation());
                 filters::check(filter, &update);
-                assert_eq!(twin.observe(seen.observation()), update, "the restored filter does as the saved one does");
+                assert_eq!(twin.observe(seen.observation()), update, "the restored filter equals the saved one");
             }
             Then::Polish => {
                 filter.refine();
@@ -195,11 +195,11 @@ fn goes_on(filter: &mut Small, then: &[Then]) {
     again(filter);
 }
 
-/// Saves a filter and restores it elsewhere; its snapshot is the same there.
+/// Saves a filter and restores it into another one, whose snapshot is the same.
 fn again(filter: &mut Small) -> Box<Small> {
     let snapshot = filters::saved(filter);
     let mut twin = BEFORE.clone();
     assert_eq!(filters::contents(&snapshot).and_then(|contents| twin.restore(contents)), Ok(()));
-    assert_eq!(filters::saved(&mut twin), snapshot, "a snapshot comes back");
+    assert_eq!(filters::saved(&mut twin), snapshot, "the restored filter has the same snapshot");
     twin
 }

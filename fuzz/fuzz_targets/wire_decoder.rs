@@ -1,4 +1,4 @@
-//! Any bytes on the line, in any pieces: both decoders, and the listener's replica.
+//! Arbitrary bytes in arbitrary pieces to both decoders and to the listener's replica.
 #![no_main]
 
 use std::fmt::Debug;
@@ -13,16 +13,16 @@ use toposlam_fuzz::line::{Line, Piece};
 
 #[derive(Arbitrary, Debug)]
 struct Input<'a> {
-    /// The lengths of the pieces in which the bytes are fed, over and over.
+    /// The lengths of the pieces in which the bytes are fed, in rotation.
     splits: Vec<u8>,
     parts: Vec<Part<'a>>,
 }
 
 #[derive(Arbitrary, Debug)]
 enum Part<'a> {
-    /// Anything.
+    /// Arbitrary bytes.
     Any(Piece<'a>),
-    /// A message about the map: it takes several to make a replica wrong.
+    /// A message about the map; only several of them can corrupt a replica.
     Edge {
         a: u8,
         b: u8,
@@ -62,14 +62,14 @@ impl Part<'_> {
     }
 }
 
-/// The number of a vertex, most often one that the smaller maps have, or nearly.
+/// A vertex id, mostly within or just above the capacity of the smaller maps.
 fn near(vertex: u8) -> u8 {
     if vertex < 128 { vertex % 6 } else { vertex }
 }
 
-/// What a decoder handed out.
+/// A result of a decoder.
 #[derive(Clone, Copy, Debug, PartialEq)]
-enum Heard<M> {
+enum Decoded<M> {
     Message(Header, M),
     Error(DecodeError),
 }
@@ -77,16 +77,16 @@ enum Heard<M> {
 fuzz_target!(|input: Input<'_>| {
     let mut line = Line::default();
     let bytes: Vec<u8> = input.parts.iter().flat_map(|part| part.bytes(&mut line)).collect();
-    let messages = listen::<Message>(&bytes, &input.splits);
-    listen::<Request>(&bytes, &input.splits);
-    draw::<64>(&messages);
-    draw::<3>(&messages);
+    let messages = decode_three_ways::<Message>(&bytes, &input.splits);
+    decode_three_ways::<Request>(&bytes, &input.splits);
+    check_replicas::<64>(&messages);
+    check_replicas::<3>(&messages);
 });
 
-/// Hears the bytes in three ways, which must not differ.
-fn listen<M: Payload + Copy + PartialEq + Debug>(bytes: &[u8], splits: &[u8]) -> Vec<Heard<M>> {
-    let at_once = hear::<M>([bytes]);
-    assert_eq!(at_once, hear(bytes.chunks(1)), "byte by byte");
+/// Decodes the bytes at once, byte by byte and in pieces; the results must be equal.
+fn decode_three_ways<M: Payload + Copy + PartialEq + Debug>(bytes: &[u8], splits: &[u8]) -> Vec<Decoded<M>> {
+    let at_once = decode::<M>([bytes]);
+    assert_eq!(at_once, decode(bytes.chunks(1)), "byte by byte");
     let mut rest = bytes;
     let mut lengths = splits.iter().cycle();
     let pieces = std::iter::from_fn(|| {
@@ -95,88 +95,88 @@ fn listen<M: Payload + Copy + PartialEq + Debug>(bytes: &[u8], splits: &[u8]) ->
         (splits.iter().any(|&length| length > 0) && !(piece.is_empty() && rest.is_empty())).then_some(piece)
     });
     let pieces: Vec<&[u8]> = pieces.collect();
-    assert_eq!(at_once, hear(pieces.into_iter().chain([rest])), "in pieces");
-    let (heard, counters) = at_once;
-    check_counters(&heard, counters);
-    assert!(heard.len() <= bytes.iter().filter(|&&byte| byte == 0).count(), "more frames than ends of frames");
-    for heard in &heard {
-        if let Heard::Message(_, message) = heard {
-            comes_back(message);
+    assert_eq!(at_once, decode(pieces.into_iter().chain([rest])), "in pieces");
+    let (decoded, counters) = at_once;
+    check_counters(&decoded, counters);
+    assert!(decoded.len() <= bytes.iter().filter(|&&byte| byte == 0).count(), "more frames than closing zeros");
+    for decoded in &decoded {
+        if let Decoded::Message(_, message) = decoded {
+            check_round_trip(message);
         }
     }
-    heard
+    decoded
 }
 
-fn hear<'bytes, M: Payload>(pieces: impl IntoIterator<Item = &'bytes [u8]>) -> (Vec<Heard<M>>, DecoderCounters) {
+fn decode<'bytes, M: Payload>(pieces: impl IntoIterator<Item = &'bytes [u8]>) -> (Vec<Decoded<M>>, DecoderCounters) {
     let mut decoder = Decoder::<M>::new();
-    let mut heard = Vec::new();
+    let mut decoded = Vec::new();
     for mut piece in pieces {
         loop {
             let before = piece.len();
             match decoder.feed(piece) {
                 Progress::NeedsMore => break,
                 Progress::Message { header, message, rest } => {
-                    heard.push(Heard::Message(header, message));
+                    decoded.push(Decoded::Message(header, message));
                     piece = rest;
                 }
                 Progress::Error { error, rest } => {
-                    heard.push(Heard::Error(error));
+                    decoded.push(Decoded::Error(error));
                     piece = rest;
                 }
             }
-            assert!(piece.len() < before, "a frame takes a byte at least");
+            assert!(piece.len() < before, "a frame has at least one byte");
         }
     }
-    (heard, decoder.counters())
+    (decoded, decoder.counters())
 }
 
-/// The counters are what was handed out.
-fn check_counters<M>(heard: &[Heard<M>], counters: DecoderCounters) {
+/// Asserts that the counters match the results.
+fn check_counters<M>(decoded: &[Decoded<M>], counters: DecoderCounters) {
     let mut expected = DecoderCounters::default();
-    for heard in heard {
-        match heard {
-            Heard::Message(header, _) => {
+    for decoded in decoded {
+        match decoded {
+            Decoded::Message(header, _) => {
                 expected.messages += 1;
                 if let Arrival::AfterGap { lost } = header.arrival {
                     expected.lost += u32::from(lost);
                 }
             }
-            Heard::Error(DecodeError::Corrupt) => expected.corrupt += 1,
-            Heard::Error(DecodeError::Cut) => expected.cut += 1,
-            Heard::Error(DecodeError::TooLong) => expected.too_long += 1,
-            Heard::Error(DecodeError::UnknownVersion { .. }) => expected.unknown_version += 1,
-            Heard::Error(DecodeError::UnknownMessage) => expected.unknown_message += 1,
-            Heard::Error(error) => panic!("{error} has no counter"),
+            Decoded::Error(DecodeError::Corrupt) => expected.corrupt += 1,
+            Decoded::Error(DecodeError::Cut) => expected.cut += 1,
+            Decoded::Error(DecodeError::TooLong) => expected.too_long += 1,
+            Decoded::Error(DecodeError::UnknownVersion { .. }) => expected.unknown_version += 1,
+            Decoded::Error(DecodeError::UnknownMessage) => expected.unknown_message += 1,
+            Decoded::Error(error) => panic!("{error} has no counter"),
         }
     }
     assert_eq!(counters, expected);
 }
 
-/// A message that was decoded can be encoded, and is the same then.
-fn comes_back<M: Payload + PartialEq + Debug>(message: &M) {
+/// Asserts that a decoded message can be encoded and decodes to itself.
+fn check_round_trip<M: Payload + PartialEq + Debug>(message: &M) {
     let mut buffer = [0; MAX_FRAME_BYTES];
-    let frame = Encoder::new(7).encode(message, &mut buffer).expect("what was decoded has room in a frame");
+    let frame = Encoder::new(7).encode(message, &mut buffer).expect("a decoded message fits a frame");
     match Decoder::<M>::new().feed(frame) {
         Progress::Message { message: again, rest: [], .. } => assert_eq!(again, *message),
         other => panic!("{other:?}"),
     }
 }
 
-/// Draws the map, which must be one whatever was heard.
-fn draw<const V: usize>(heard: &[Heard<Message>]) {
+/// Applies the messages to a replica, which must be consistent after any input.
+fn check_replicas<const V: usize>(decoded: &[Decoded<Message>]) {
     let mut replica = MapReplica::<V>::new();
-    for heard in heard {
-        if let Heard::Message(header, message) = heard {
+    for decoded in decoded {
+        if let Decoded::Message(header, message) = decoded {
             replica.apply(*header, message);
             if V < 16 {
-                check_picture(&replica);
+                check_consistency(&replica);
             }
         }
     }
-    check_picture(&replica);
+    check_consistency(&replica);
 }
 
-fn check_picture<const V: usize>(replica: &MapReplica<V>) {
+fn check_consistency<const V: usize>(replica: &MapReplica<V>) {
     let vertices = replica.vertices();
     assert!(usize::from(vertices) <= V);
     for from in 0..=V as u8 {
@@ -190,6 +190,6 @@ fn check_picture<const V: usize>(replica: &MapReplica<V>) {
         assert!(!replica.is_complete() || row.is_some() == (from < vertices));
     }
     assert!(replica.edges().all(|(a, b)| a <= b && b < vertices));
-    // It must not panic; whether it holds is up to the sender.
+    // It must not panic; the result depends on the sender.
     let _ = replica.is_converged();
 }

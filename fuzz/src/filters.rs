@@ -1,4 +1,4 @@
-//! A small robust filter, what a robot may see, and what holds of a filter whatever it saw.
+//! A small robust filter, arbitrary observations, and the invariants of every filter.
 
 use arbitrary::Arbitrary;
 use toposlam::persist::snapshot::{FILTER_SECTION, Reader, Snapshot, SnapshotError, Writer};
@@ -14,10 +14,10 @@ pub type Small = RobustFilter<HYPOTHESES, VERTICES, 40>;
 /// The settings of a small filter.
 pub const CONFIG: RobustConfig = RobustConfig::DEFAULT.with_hypotheses(HYPOTHESES as u8);
 
-/// Where the contents of the filter's section have the number of moves at a place.
+/// The offset of the setting `moves` in the filter's section.
 const MOVES_AT: usize = 9;
 
-/// What a robot sees of a place.
+/// An arbitrary observation of a place.
 #[derive(Arbitrary, Clone, Copy, Debug)]
 pub struct Seen {
     steps: u16,
@@ -43,7 +43,7 @@ impl Seen {
     }
 }
 
-/// A place of a walk through seven rooms, some alike; the same numbers give the same walk.
+/// A place of a walk through seven rooms, some of them similar; equal arguments give the same walk.
 pub fn walk(index: usize) -> Observation {
     let room = index * index % 11 % 7;
     let steps = [400, 580, 400, 760, 1000, 1010, 1400][room] + (index * 5 % 13) as u16;
@@ -55,7 +55,7 @@ pub fn walk(index: usize) -> Observation {
     }
 }
 
-/// A small filter after so many places of the walk.
+/// A small filter after a number of places of the walk.
 pub fn after(places: usize) -> Box<Small> {
     let mut filter = Box::new(Small::new());
     filter.start(CONFIG, 1).unwrap();
@@ -66,7 +66,7 @@ pub fn after(places: usize) -> Box<Small> {
     filter
 }
 
-/// A small filter that knows a map.
+/// A small filter started with a map.
 pub fn with_map() -> Box<Small> {
     let mut map = Map::new();
     let vertices = [900, 1300, 1700, 2100, 2500]
@@ -83,7 +83,7 @@ pub fn with_map() -> Box<Small> {
 pub fn saved(filter: &mut Small) -> Vec<u8> {
     let mut buffer = [0; Small::SNAPSHOT_BYTES];
     let mut writer = Writer::new(&mut buffer).unwrap();
-    writer.stage(filter).expect("there is room for all of it");
+    writer.stage(filter).expect("the buffer has room for the whole filter");
     let length = writer.finish().unwrap();
     buffer[..length].to_vec()
 }
@@ -93,13 +93,13 @@ pub fn contents(snapshot: &[u8]) -> Result<Reader<'_>, SnapshotError> {
     Snapshot::open(snapshot)?.section(FILTER_SECTION).ok_or(SnapshotError::Contents)
 }
 
-/// How many moves a filter makes at each place.
+/// The setting `moves` of a filter.
 pub fn moves(filter: &mut Small) -> u8 {
     let snapshot = saved(filter);
     *contents(&snapshot).unwrap().bytes(MOVES_AT + 1).unwrap().last().unwrap()
 }
 
-/// Checks that the map is one, and that the path leads through it.
+/// Checks that the map is valid and that the path is a walk of it.
 pub fn check_map(filter: &Small) {
     let map = filter.map();
     let vertices = map.vertices().len();
@@ -114,12 +114,12 @@ pub fn check_map(filter: &Small) {
     assert!(filter.path().all(|vertex| map.contains(vertex)));
 }
 
-/// Checks what holds of every filter behind an update.
+/// Checks the invariants of a filter after an update.
 pub fn check(filter: &Small, update: &Update) {
     check_map(filter);
     let is_vertex = |vertex: VertexId| filter.map().contains(vertex);
     if filter.map().vertices().len() == 0 {
-        // It only localises, and has no map to do that in.
+        // The filter only localises and has an empty map.
         return;
     }
     for vertex in VertexId::first(VertexId::LIMIT) {

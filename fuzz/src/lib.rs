@@ -1,4 +1,4 @@
-//! What the fuzz targets share: frames with a right checksum, whatever is in them, and robust filters to save and restore.
+//! Shared by the fuzz targets: frames with a valid CRC and arbitrary contents, and robust filters to save and restore.
 
 pub mod filters;
 pub mod line;

@@ -1,52 +1,52 @@
-//! What a serial line carries: noise, and frames whose checksum is right, so that a fuzzer gets behind it.
+//! The bytes of a serial line: noise, and frames with a valid CRC, so that a fuzzer reaches the code behind the check.
 
 use arbitrary::Arbitrary;
 use toposlam::wire::{Encoder, FRAME_VERSION, MAX_FRAME_BYTES, Payload, crc32};
 
-/// The longest payload put into a frame: longer than any message, short enough for one block of COBS.
+/// The longest payload of a frame: longer than any message, short enough for one COBS block.
 const LONGEST_PAYLOAD: usize = 240;
 
-/// One piece of what the line carries.
+/// One piece of the line's bytes.
 #[derive(Arbitrary, Debug)]
 pub enum Piece<'a> {
-    /// Bytes as they are.
+    /// Arbitrary bytes.
     Bytes(&'a [u8]),
-    /// A frame with a right checksum.
+    /// A frame with a valid CRC.
     Frame(Frame<'a>),
-    /// The same with one byte changed on the way.
+    /// A frame with one byte changed by the line.
     Damaged {
         /// The frame as it was sent.
         frame: Frame<'a>,
-        /// Which byte, counted round and round.
+        /// The index of the byte, modulo the length.
         at: u8,
-        /// What it is xored with.
+        /// The value that is xored to it.
         with: u8,
     },
 }
 
-/// A frame with a right checksum, whatever its payload.
+/// A frame with a valid CRC and an arbitrary payload.
 #[derive(Arbitrary, Debug)]
 pub struct Frame<'a> {
-    /// Which way it goes.
+    /// The direction.
     pub way: Way,
-    /// By how much its number is off the one that is due.
+    /// The offset of its sequence number from the next one.
     pub skip: Option<i16>,
-    /// What it carries.
+    /// The payload.
     pub payload: &'a [u8],
 }
 
-/// Which way a frame goes, and so its first byte.
+/// The direction of a frame, given by its first byte.
 #[derive(Arbitrary, Clone, Copy, Debug)]
 pub enum Way {
     /// A message.
     FromRobot,
     /// A request.
     ToRobot,
-    /// A version that need not exist.
+    /// An arbitrary frame version.
     Unknown(u8),
 }
 
-/// Makes the bytes of a line, and numbers the frames.
+/// Produces the bytes of a line and numbers the frames.
 #[derive(Default)]
 pub struct Line {
     sequence: u16,
@@ -66,10 +66,10 @@ impl Line {
         }
     }
 
-    /// The frame of a message or request that is due next.
+    /// The frame of a message or request with the next sequence number.
     pub fn say(&mut self, message: &impl Payload) -> Vec<u8> {
         let mut buffer = [0; MAX_FRAME_BYTES];
-        let frame = Encoder::new(self.sequence).encode(message, &mut buffer).expect("there is room for every message");
+        let frame = Encoder::new(self.sequence).encode(message, &mut buffer).expect("every message fits");
         self.sequence = self.sequence.wrapping_add(1);
         frame.to_vec()
     }
@@ -96,7 +96,7 @@ impl Line {
     }
 }
 
-/// Changes one byte, counted round and round.
+/// Changes one byte; the index is taken modulo the length.
 pub fn damage(bytes: &mut [u8], at: u8, with: u8) {
     let length = bytes.len();
     if let Some(byte) = bytes.get_mut(usize::from(at) % length.max(1)) {

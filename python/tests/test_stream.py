@@ -1,4 +1,4 @@
-"""The decoder is held to the golden file that the Rust library writes: `python -m unittest discover python/tests`."""
+"""Checks the decoder against the golden file of the Rust library: `python -m unittest discover python/tests`."""
 
 from __future__ import annotations
 
@@ -90,7 +90,7 @@ def plain(message: Any) -> Any:
 
 
 def needs(what: str, is_there: bool) -> Callable[[Any], Any]:
-    """Skips a test loudly without something that it needs; where nobody looks, it fails."""
+    """Skips a test with a message if a requirement is missing; fails it in CI."""
     if is_there:
         return lambda test: test
     print(f"SKIPPED: {what} is missing", file=sys.stderr)
@@ -100,7 +100,7 @@ def needs(what: str, is_there: bool) -> Callable[[Any], Any]:
 
 
 class Golden(unittest.TestCase):
-    def test_every_message_is_read_as_the_library_reads_it_and_packed_as_it_packs_it(self) -> None:
+    def test_every_message_decodes_and_encodes_like_the_library(self) -> None:
         for record in of_kind("message"):
             with self.subTest(record["event"]["event"], frame=record["frame"]):
                 frame = bytes.fromhex(record["frame"])
@@ -108,7 +108,7 @@ class Golden(unittest.TestCase):
                 self.assertEqual(to_json(event), record["event"])
                 self.assertEqual(Encoder(event.sequence).encode(event.message), frame)
 
-    def test_every_request_is_packed_as_the_library_packs_it(self) -> None:
+    def test_every_request_encodes_like_the_library(self) -> None:
         for record in of_kind("request"):
             with self.subTest(request=record["request"]):
                 frame = bytes.fromhex(record["frame"])
@@ -116,7 +116,7 @@ class Golden(unittest.TestCase):
                 self.assertEqual(plain(event.message), record["request"])
                 self.assertEqual(Encoder(record["sequence"]).encode(event.message), frame)
 
-    def test_the_golden_file_holds_every_message_outcome_command_and_setting(self) -> None:
+    def test_the_golden_file_covers_every_message_outcome_command_and_setting(self) -> None:
         messages = {record["event"]["event"] for record in of_kind("message")}
         self.assertEqual(messages, {of.__name__ for of in toposlam_stream.Message.__args__})
 
@@ -130,7 +130,7 @@ class Golden(unittest.TestCase):
         settings = {next(iter(command["SetConfig"])) for command in commands if "SetConfig" in command}
         self.assertEqual(len(settings), len(Setting))
 
-    def test_every_stream_gives_the_events_counts_and_map_that_the_library_has(self) -> None:
+    def test_every_stream_gives_the_events_counts_and_map_of_the_library(self) -> None:
         for record in of_kind("stream"):
             with self.subTest(record["name"]):
                 decoder, replica = Decoder(), MapReplica()
@@ -146,7 +146,7 @@ class Golden(unittest.TestCase):
                 self.assertEqual(converged, record["converged"])
                 self.assertEqual(replica_json(replica), record["replica"])
 
-    def test_it_does_not_matter_how_a_stream_is_split(self) -> None:
+    def test_decoding_is_independent_of_the_split_points(self) -> None:
         for record in of_kind("stream"):
             stream = bytes.fromhex(record["bytes"])
             whole, decoder = feed_in_pieces(stream, len(stream))
@@ -156,7 +156,7 @@ class Golden(unittest.TestCase):
                     self.assertEqual(events, whole)
                     self.assertEqual(in_pieces.counters, decoder.counters)
 
-    def test_the_examples_and_the_versions_of_the_specification_are_met(self) -> None:
+    def test_the_examples_and_versions_match_the_specification(self) -> None:
         specification = (REPOSITORY / "docs/wire.md").read_text()
         for version in (toposlam_stream.PROTOCOL_VERSION, toposlam_stream.FRAME_VERSION):
             self.assertIn(f"version is {version}", specification)
@@ -172,7 +172,7 @@ class Golden(unittest.TestCase):
 
 
 class Robustness(unittest.TestCase):
-    def test_no_bytes_make_the_decoder_the_replica_or_the_json_raise(self) -> None:
+    def test_arbitrary_bytes_never_raise(self) -> None:
         draw = random.Random(1)
         intact = exploration()
         for _ in range(300):
@@ -200,20 +200,20 @@ class Robustness(unittest.TestCase):
                 heard.append(type(event))
             self.assertEqual(set(heard), {Heard, Damaged})
 
-    def test_bytes_without_an_end_are_not_kept(self) -> None:
+    def test_an_endless_frame_is_not_buffered(self) -> None:
         decoder = Decoder()
         for _ in range(100):
             self.assertEqual(decoder.feed(b"\xff" * 10_000), [])
             self.assertLess(len(decoder._begun), 200)
         self.assertEqual(decoder.feed(b"\0"), [Damaged(DecodeError.TOO_LONG)])
 
-    def test_counts_stay_at_their_end(self) -> None:
+    def test_counters_saturate(self) -> None:
         decoder = Decoder()
         decoder.counters.cut = 0xFFFF_FFFF
         decoder.feed(b"\1\0")
         self.assertEqual(decoder.counters, Counters(cut=0xFFFF_FFFF))
 
-    def test_what_is_out_of_its_range_is_not_packed_and_uses_up_no_number(self) -> None:
+    def test_out_of_range_values_are_not_encoded_and_use_no_sequence_number(self) -> None:
         encoder = Encoder()
         for command in (
             Command.GoTo(256),
@@ -229,7 +229,7 @@ class Robustness(unittest.TestCase):
 
 
 class Understanding(unittest.TestCase):
-    def test_a_robot_of_another_version_or_with_other_messages_is_named(self) -> None:
+    def test_a_robot_with_another_version_or_schema_is_reported(self) -> None:
         hello = next(event.message for event in Decoder().feed(exploration()) if isinstance(event.message, Hello))
         self.assertIsNone(hello.complaint())
         newer = dataclasses.replace(hello, protocol_version=hello.protocol_version + 1, schema_hash=7)
@@ -241,7 +241,7 @@ class Understanding(unittest.TestCase):
 
 
 class Listeners:
-    """A TCP port that says some bytes to the first who connects, or answers."""
+    """A TCP server that serves its first client."""
 
     def __init__(self, serve: Callable[[socket.socket], None]) -> None:
         self._server = socket.create_server(("127.0.0.1", 0))
@@ -278,7 +278,7 @@ class Lines(unittest.TestCase):
         self.assertEqual(zlib.crc32(printed.stdout.encode()), record["events_crc32"])
         self.assertEqual(json.loads(printed.stderr), record["counters"])
 
-    def test_a_file_of_raw_bytes_is_a_line_that_ends_and_cannot_be_told_anything(self) -> None:
+    def test_a_file_of_raw_bytes_is_a_read_only_line_with_an_end(self) -> None:
         with tempfile.TemporaryDirectory() as directory:
             file = Path(directory, "heard")
             file.write_bytes(exploration())
@@ -291,7 +291,7 @@ class Lines(unittest.TestCase):
                         heard += line.read()
         self.assertEqual(heard, exploration())
 
-    def test_a_line_that_cannot_be_opened_is_a_message_and_not_a_trace(self) -> None:
+    def test_a_line_that_cannot_be_opened_prints_an_error_without_a_traceback(self) -> None:
         for name in ("tcp:127.0.0.1", "tcp:127.0.0.1:1", "/no/such/port"):
             with self.subTest(name):
                 printed = script("-m", "toposlam_stream", name)
@@ -299,7 +299,7 @@ class Lines(unittest.TestCase):
                 self.assertIn("toposlam_stream: ", printed.stderr)
                 self.assertNotIn("Traceback", printed.stderr)
 
-    def test_a_serial_port_without_pyserial_says_what_to_install(self) -> None:
+    def test_a_missing_pyserial_is_reported_with_the_install_command(self) -> None:
         hidden = sys.modules.get("serial")
         sys.modules["serial"] = None  # type: ignore[assignment]
         try:
@@ -327,7 +327,7 @@ class Lines(unittest.TestCase):
 
 
 class Commanding(unittest.TestCase):
-    def test_a_request_is_repeated_until_its_reply_comes(self) -> None:
+    def test_a_request_is_repeated_until_its_reply(self) -> None:
         ear, mouth = Decoder(requests=True), Encoder()
         to_client = [b"noise"]
         asked = []
@@ -345,13 +345,13 @@ class Commanding(unittest.TestCase):
         client.timeout_s = 0.05
         self.assertEqual(client.request(Command.GoTo(3)), Outcome.Refused(Refusal.NO_ROUTE))
         self.assertEqual(len(asked), 2)
-        self.assertEqual(asked[0], asked[1], "the very same request, so that it is executed once")
+        self.assertEqual(asked[0], asked[1], "the repeated request is identical, so that it is executed once")
         self.assertEqual(client.replica.goal_status, GoalStatus(3, GoalState.ACTIVE))
         self.assertTrue(any(isinstance(event, Damaged) for event in heard))
         client.request(Command.Explore())
         self.assertNotEqual(asked[2].id, asked[0].id)
 
-    def test_a_robot_that_does_not_answer_is_given_up(self) -> None:
+    def test_a_silent_robot_times_out(self) -> None:
         sent = []
         client = Client(Line(lambda: b"", sent.append, lambda: None))
         client.timeout_s, client.attempts = 0.01, 3
@@ -364,7 +364,7 @@ class Commanding(unittest.TestCase):
         built = [target / profile / "toposlam" for profile in ("release", "debug")]
         return next((path for path in built if path.is_file()), None)
 
-    def test_a_simulated_robot_does_what_it_is_told(self) -> None:
+    def test_a_simulated_robot_executes_commands(self) -> None:
         toposlam = self.toposlam()
         if toposlam is None:
             print("SKIPPED: the command toposlam is not built", file=sys.stderr)
@@ -406,7 +406,7 @@ class Example(unittest.TestCase):
             self.assertGreater(picture.stat().st_size, blank.stat().st_size + 5000, "something is drawn")
 
     @needs("matplotlib", importlib.util.find_spec("matplotlib") is not None)
-    def test_a_robot_that_never_stops_is_plotted_after_the_time(self) -> None:
+    def test_an_endless_stream_is_plotted_after_the_time_limit(self) -> None:
         def talk(connection: socket.socket) -> None:
             try:
                 while True:

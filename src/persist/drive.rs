@@ -1,4 +1,4 @@
-//! The drive in a snapshot: by which way the robot left each place of the history, one byte a place.
+//! The drive in a snapshot: the way by which the robot left each place of the history, one byte per place.
 
 use super::Persist;
 use super::snapshot::{DRIVE_SECTION, Reader, SnapshotError, Writer};
@@ -29,7 +29,7 @@ impl<const V: usize, const HISTORY: usize> Persist for Drive<V, HISTORY> {
         section.finish()
     }
 
-    /// The drive then explores and looks for the Voronoi graph.
+    /// After a restore, the drive explores and searches for the Voronoi graph.
     fn restore(&mut self, mut section: Reader<'_>) -> Result<(), SnapshotError> {
         self.check(section)?;
         let places = section.u16()?;

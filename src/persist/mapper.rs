@@ -1,4 +1,4 @@
-//! The mapper in a snapshot: the state of its filter. The place detector starts afresh after a restore.
+//! The mapper in a snapshot: the state of its filter. The place detector is reset by a restore.
 
 use super::Persist;
 use super::snapshot::{Resume, Snapshot, SnapshotError, Writer};
@@ -8,7 +8,7 @@ use crate::mapper::Mapper;
 impl<const SONARS: usize, const V: usize, F: Filter<V> + Persist> Mapper<SONARS, V, F> {
     /// Writes a snapshot of the mapper alone and returns its length in bytes.
     ///
-    /// It has as many hypotheses as there is room for, the best first; the published map does not change. For a
+    /// It holds as many hypotheses as fit, the best first; the published map does not change. For a
     /// [`RobustFilter`](crate::RobustFilter), `RobustFilter::SNAPSHOT_BYTES` is room for all of them. Call it between two
     /// places.
     ///
@@ -20,7 +20,7 @@ impl<const SONARS: usize, const V: usize, F: Filter<V> + Persist> Mapper<SONARS,
         writer.finish()
     }
 
-    /// Writes the mapper's section of a snapshot, after those of other stages: it uses all the remaining room.
+    /// Writes the mapper's section of a snapshot. It uses all the remaining room, so the other stages come first.
     ///
     /// # Errors
     /// As [`Mapper::snapshot`].
@@ -32,7 +32,7 @@ impl<const SONARS: usize, const V: usize, F: Filter<V> + Persist> Mapper<SONARS,
     /// started.
     ///
     /// # Errors
-    /// [`SnapshotError`] says what is wrong with the bytes; nothing has changed then.
+    /// [`SnapshotError`] if the snapshot is invalid; the mapper does not change then.
     pub fn restore(&mut self, bytes: &[u8], resume: Resume) -> Result<(), SnapshotError> {
         Snapshot::open(bytes)?.restore(&mut self.filter)?;
         self.starts_sequence = resume == Resume::AtUnknownVertex;

@@ -1,6 +1,6 @@
-//! State that survives a restart: snapshots of what the robot has learned, and the flash that stores them.
+//! State that survives a restart: snapshots of the map and the drive, and the flash that stores them.
 //!
-//! This room knows the stages whose state it saves; no stage knows this room.
+//! This module depends on the stages whose state it saves; no stage depends on this module.
 
 mod drive;
 mod mapper;
@@ -77,7 +77,7 @@ pub trait Persist {
     /// Checks that [`Persist::restore`] accepts a section. The state of the stage does not change.
     ///
     /// # Errors
-    /// [`SnapshotError`] says what is wrong with the section.
+    /// [`SnapshotError`] if the section is invalid.
     fn check(&mut self, section: Reader<'_>) -> Result<(), SnapshotError>;
 
     /// Replaces the state of the stage by that of a section.

@@ -28,7 +28,7 @@ pub trait Board {
     /// The largest stack use since the start in bytes; 0 if it is not measured.
     fn stack_high_water_bytes(&mut self) -> u32;
 
-    /// Stores a snapshot so that it survives a power cut. The robot stands still meanwhile.
+    /// Stores a snapshot so that it survives a power cut. The robot stands still during the call.
     ///
     /// # Errors
     /// [`SaveError`]; earlier snapshots must then still be stored.

@@ -10,8 +10,10 @@ use crate::wire::Staging;
 impl<'buffer, const SONARS: usize, const N: usize, const V: usize, const HISTORY: usize>
     Robot<'buffer, SONARS, N, V, HISTORY>
 {
-    /// Starts the robot as [`Robot::start`] does, then restores the newest snapshot of a store if the policy says so. Without a
-    /// valid snapshot the map stays empty. A snapshot includes the settings of the filter.
+    /// Starts the robot and restores the newest snapshot of a store, if the policy allows it.
+    ///
+    /// The start is that of [`Robot::start`]. Without a valid snapshot the map stays empty. A snapshot includes the settings of
+    /// the filter.
     ///
     /// # Errors
     /// As [`Robot::start`].

@@ -12,7 +12,7 @@ use crate::wire::{Command, GoalState, GoalStatus, Info, Message, Outcome, Refusa
 pub(super) const NO_GOAL: (Goal, drive::GoalStatus) = (Goal::Explore, drive::GoalStatus::Inactive);
 
 impl<const SONARS: usize, const N: usize, const V: usize, const HISTORY: usize> Robot<'_, SONARS, N, V, HISTORY> {
-    /// Reads what the line has received, and executes at most one command.
+    /// Reads the received bytes and executes at most one command.
     #[inline(never)]
     pub(super) fn poll_commands(&mut self, board: &mut impl Board) {
         for _ in 0..RECEIVED_PER_TURN {
@@ -74,7 +74,7 @@ impl<const SONARS: usize, const N: usize, const V: usize, const HISTORY: usize> 
         }
     }
 
-    /// Restores the snapshot that came over the line. The robot may be at any vertex.
+    /// Restores the snapshot received over the line. The robot may be at any vertex.
     fn restore_staged(&mut self, board: &mut impl Board) -> Result<(), Refusal> {
         let Self { mapper, drive, staging, encoder, faults, .. } = self;
         let bytes = staging.commit()?;

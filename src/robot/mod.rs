@@ -15,7 +15,7 @@
 //! use toposlam::robot::{Board, SaveError};
 //! use toposlam::{FaultCounters, drive::VelocityCommand, wire::QueueFull};
 //!
-//! /// A board with nothing on it.
+//! /// A board without any hardware.
 //! struct Bare;
 //!
 //! impl Board for Bare {
@@ -77,7 +77,8 @@ const RECEIVED_PER_TURN: usize = 1024;
 /// The result of a turn: the place and the map update, if the frame completed a visit to a place.
 pub type Seen = Option<(Place, Update)>;
 
-/// A robot with a ring of `SONARS` and a filter of `N` hypotheses, maps of `V` vertices and a history of `HISTORY` places.
+/// A robot with a ring of `SONARS` sensors and a filter of `N` hypotheses, maps of `V` vertices and a history of
+/// `HISTORY` places.
 ///
 /// Const-constructed to zero, so that a `static` of it lies in `.bss`, and set up in place by [`Robot::start`]. Memory: the
 /// mapper's and the drive's, 700 bytes, and the caller's buffer for snapshots. Each turn costs at most what one place or one
@@ -102,14 +103,14 @@ pub struct Robot<'buffer, const SONARS: usize, const N: usize, const V: usize, c
     turns: u32,
     last_turn_ms: Option<u32>,
     worst_turn_ms: u32,
-    /// The goal status that was sent last.
+    /// The last goal status sent.
     sent_goal: (Goal, GoalStatus),
 }
 
 impl<'buffer, const SONARS: usize, const N: usize, const V: usize, const HISTORY: usize>
     Robot<'buffer, SONARS, N, V, HISTORY>
 {
-    /// A robot that has to be started with [`Robot::start`].
+    /// A robot that must be started with [`Robot::start`].
     pub const fn new() -> Self {
         Self {
             config: RobotConfig::UNSET,
@@ -171,7 +172,7 @@ impl<'buffer, const SONARS: usize, const N: usize, const V: usize, const HISTORY
         self.send_velocity(velocity, board);
         let is_due = |(_, update): &(Place, Update)| self.policy().is_due(update.place_index);
         if seen.as_ref().is_some_and(is_due) {
-            // Erasing flash takes up to seconds; the robot must not drive blindly meanwhile.
+            // Erasing flash can take seconds; the robot must not drive blindly during that time.
             board.follow(VelocityCommand::STOP);
             self.save_snapshot(board);
             self.last_turn_ms = None;
@@ -185,7 +186,7 @@ impl<'buffer, const SONARS: usize, const N: usize, const V: usize, const HISTORY
                 stack_high_water_bytes: board.stack_high_water_bytes(),
                 worst_turn_us: self.worst_turn_ms.saturating_mul(1000),
             };
-            // A message that finds no room is counted; the next one comes.
+            // A message without room is counted; a later one follows.
             let _ = self.send(&Message::Health(health), board);
         }
         self.turns = self.turns.wrapping_add(1);
@@ -244,7 +245,7 @@ impl<'buffer, const SONARS: usize, const N: usize, const V: usize, const HISTORY
     /// Restores a snapshot, of this robot or of another one with the same capacities.
     ///
     /// # Errors
-    /// [`SnapshotError`] says what is wrong with the bytes; nothing has changed then, and the fault is counted.
+    /// [`SnapshotError`] if the snapshot is invalid; the state does not change then, and the fault is counted.
     #[inline(never)]
     pub fn restore(&mut self, bytes: &[u8], resume: Resume) -> Result<(), SnapshotError> {
         let Self { mapper, drive, .. } = self;
@@ -364,7 +365,7 @@ fn snapshot<const SONARS: usize, const N: usize, const V: usize, const HISTORY: 
     writer.finish()
 }
 
-/// Restores a snapshot. One without the drive's section is of a robot that was driven by hand.
+/// Restores a snapshot. A snapshot without the drive's section is from a robot driven by hand.
 fn restore<const SONARS: usize, const N: usize, const V: usize, const HISTORY: usize>(
     mapper: &mut Mapper<SONARS, V, RobustFilter<N, V, HISTORY>>,
     drive: &mut Drive<V, HISTORY>,

@@ -23,7 +23,7 @@ pub enum Progress<'bytes, M = Message> {
     },
     /// The bytes between two zeros were not a message. They were counted and dropped.
     Error {
-        /// What was wrong.
+        /// The error.
         error: DecodeError,
         /// The bytes that were not consumed: feed them next.
         rest: &'bytes [u8],
@@ -33,13 +33,13 @@ pub enum Progress<'bytes, M = Message> {
 /// The header of a frame.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Header {
-    /// The number of the frame.
+    /// The sequence number of the frame.
     pub sequence: u16,
-    /// How the number follows on the previous ones.
+    /// How the sequence number relates to the previous ones.
     pub arrival: Arrival,
 }
 
-/// How the number of a frame follows on the previous ones.
+/// How the sequence number of a frame relates to the previous ones.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Arrival {
     /// The first intact frame.
@@ -64,9 +64,9 @@ pub struct DecoderCounters {
     pub messages: u32,
     /// Frames that are missing according to the sequence numbers (a frame that arrived corrupt is one of them).
     pub lost: u32,
-    /// Frames of right shape with a wrong CRC.
+    /// Well-formed frames with a wrong CRC.
     pub corrupt: u32,
-    /// Frames that were cut short.
+    /// Truncated frames.
     pub cut: u32,
     /// Frames longer than any message.
     pub too_long: u32,
@@ -79,8 +79,8 @@ pub struct DecoderCounters {
 /// Decodes the bytes of a serial line, in pieces of any length, into messages; on the robot, into
 /// [`Request`](super::Request)s.
 ///
-/// It never blocks and never reads beyond a complete frame. The next zero byte ends every frame, whatever is wrong inside it,
-/// so that damage never spreads beyond a frame and its neighbour. Memory: 160 bytes.
+/// It never blocks and never reads beyond a complete frame. The next zero byte ends every frame, valid or not, so that
+/// damage never spreads beyond a frame and its neighbour. Memory: 160 bytes.
 ///
 /// ```
 /// use toposlam::wire::{Decoder, Encoder, MAX_FRAME_BYTES, Message, Progress};
@@ -107,9 +107,9 @@ pub struct DecoderCounters {
 pub struct Decoder<M = Message> {
     raw: [u8; MAX_RAW_BYTES],
     length: usize,
-    /// How many bytes are left of the COBS block.
+    /// Remaining bytes of the COBS block.
     block_left: u8,
-    /// Whether a byte of the frame was seen.
+    /// Whether the frame has at least one byte.
     begun: bool,
     too_long: bool,
     last_sequence: Option<u16>,
@@ -119,7 +119,7 @@ pub struct Decoder<M = Message> {
 }
 
 impl<M: Payload> Decoder<M> {
-    /// Numbers that lie at most so far back are late frames, not a restart.
+    /// A sequence number at most this far back is a late frame, not a restart.
     const LATE_WINDOW: u16 = 64;
 
     /// A decoder without input.
@@ -186,7 +186,7 @@ impl<M: Payload> Decoder<M> {
         Progress::NeedsMore
     }
 
-    /// Takes one byte that is not zero.
+    /// Decodes one non-zero byte.
     fn take(&mut self, byte: u8) {
         if self.block_left > 0 {
             self.block_left -= 1;

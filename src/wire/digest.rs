@@ -13,7 +13,7 @@ pub fn crc32(bytes: &[u8]) -> u32 {
 ///
 /// The canonical bytes are the number of vertices (`u8`) and, for each vertex in order, the radius in millimetres
 /// (`u16`), the number of visits (`u32`) and the neighbours (`u64`, bit `w` for vertex `w`), all little endian. Two
-/// different maps have the same digest once in 2³² times. Cost: 14 bytes a vertex.
+/// different maps have the same digest with probability 2⁻³². Cost: 14 bytes a vertex.
 pub fn map_digest<const V: usize>(map: &Map<V>) -> u32 {
     rows_digest(map.vertices().len() as u8, map.vertices().map(|vertex| row_of(map, vertex)))
 }
@@ -30,7 +30,7 @@ pub(super) fn rows_digest(vertices: u8, rows: impl Iterator<Item = Row>) -> u32 
     digest.finalize()
 }
 
-/// All that a map says about one vertex.
+/// The canonical bytes of one vertex.
 pub(super) fn row_of<const V: usize>(map: &Map<V>, vertex: VertexId) -> Row {
     Row {
         vertex: vertex.into(),

@@ -22,7 +22,7 @@ pub(super) const MAX_RAW_BYTES: usize = HEADER_BYTES + MAX_PAYLOAD_BYTES + CRC_B
 /// The largest frame on the wire: COBS adds one byte, and a zero closes the frame.
 pub const MAX_FRAME_BYTES: usize = MAX_RAW_BYTES + 2;
 
-const _: () = assert!(MAX_RAW_BYTES < 254, "the short COBS here knows no block of 254 bytes");
+const _: () = assert!(MAX_RAW_BYTES < 254, "the short COBS encoder has no block of 254 bytes");
 
 /// Encodes messages or requests as numbered frames.
 ///
@@ -130,7 +130,7 @@ mod tests {
     }
 
     #[test]
-    fn a_buffer_that_is_too_short_is_refused_and_no_number_is_used_up() {
+    fn a_short_buffer_is_refused_without_using_a_sequence_number() {
         let message = Message::Edge { a: 1, b: 2, present: true };
         let mut out = [0; MAX_FRAME_BYTES];
         let frame = Encoder::new(7).encode(&message, &mut out).unwrap().to_vec();

@@ -4,7 +4,7 @@ use toposlam::wire::{Command, Decoder, Inbox, Outcome, Progress, Refusal, Reques
 
 use super::STAGING_BYTES;
 
-/// The state of an inbox and of a staging buffer by their specification.
+/// The specified state of an inbox and of a staging buffer.
 #[derive(Default)]
 pub(crate) struct Expected {
     pub(crate) decoder: Decoder<Request>,
@@ -16,7 +16,7 @@ pub(crate) struct Expected {
 }
 
 impl Expected {
-    /// The request that is due after the bytes of one turn.
+    /// The request to execute after the bytes of one turn.
     pub(crate) fn receive(&mut self, bytes: &[u8]) -> Option<Request> {
         let most = usize::from(Inbox::BYTES_PER_TURN);
         self.flood += u32::from(bytes.len() > most);
@@ -37,7 +37,7 @@ impl Expected {
         }
     }
 
-    /// One request at most is executed, unless it is the last one again; its reply is what came of it.
+    /// At most one request is executed, unless it repeats the last one; its reply holds the outcome.
     pub(crate) fn judge(
         &mut self,
         due: Option<Request>,

@@ -1,4 +1,4 @@
-//! The address changes: every one ends within its bounds of messages and waiting.
+//! Address changes: each ends within its bounds of messages and waiting time.
 
 use toposlam::ring::drivers::AddressError;
 

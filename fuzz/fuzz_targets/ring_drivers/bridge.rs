@@ -1,4 +1,4 @@
-//! The SC18IM700 bridge: every call ends within its budget of polls.
+//! The SC18IM700 bridge: every call ends within its poll budget.
 
 use arbitrary::Arbitrary;
 use embedded_hal::i2c::{I2c, Operation};

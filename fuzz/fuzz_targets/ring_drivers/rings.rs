@@ -1,4 +1,4 @@
-//! The rings: every frame is valid and ends within its bounds of messages, polls and waiting.
+//! Ring drivers: every frame is valid and ends within its bounds of messages, polls and waiting time.
 
 use arbitrary::Arbitrary;
 use embedded_hal::i2c::I2c;
@@ -125,7 +125,7 @@ pub(crate) fn hc_sr04(settings: &HcSr04<'_>, clock: &[u8], answers: &[u8]) {
     assert!(waited.microseconds() <= u64::from(FRAMES * groups) * group_us);
 }
 
-/// Every echo is in range, each dead sensor is counted once and nothing else is, and the last one is reported.
+/// Asserts that every echo is in range, that exactly the dead sensors are counted, and that the last one is reported.
 fn check_frame(ring: &mut impl SonarRing<SONARS>, nearest_mm: u16, farthest_mm: u16) -> RingFrame<SONARS> {
     let mut faults = FaultCounters::new();
     let frame = ring.read(&mut faults);

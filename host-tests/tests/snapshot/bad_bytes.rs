@@ -1,4 +1,4 @@
-//! Bytes that are no snapshot, or one that no filter wrote.
+//! Invalid snapshots: damaged bytes, and contents that no filter writes.
 
 use super::common::random::cases;
 use super::*;
@@ -10,12 +10,12 @@ use toposlam::Turn;
 
 type Small = RobustFilter<3, 6, 12>;
 
-/// Where the contents have the number of moves at a place.
+/// The offset of the setting `moves` in the section.
 const MOVES_AT: usize = 9;
 
 const ROOM: usize = Small::SNAPSHOT_BYTES;
 
-/// Contents of snapshots of filters in all states.
+/// Section contents of filters in all states.
 static CONTENTS: LazyLock<Vec<Vec<u8>>> = LazyLock::new(|| {
     let mut all = Vec::new();
     for drive in drives(48) {
@@ -30,8 +30,8 @@ static CONTENTS: LazyLock<Vec<Vec<u8>>> = LazyLock::new(|| {
     all
 });
 
-/// Lets a filter go on with anything, in every way there is.
-fn goes_on(filter: &mut Small) {
+/// Runs a filter through every operation with arbitrary observations.
+fn exercise(filter: &mut Small) {
     for index in 0..40_u16 {
         let steps = 400 + 90 * (index * 5 % 7) + index % 3;
         let turn = [None, Some(Turn::Back), Some(Turn::On)][usize::from(index % 3)];
@@ -55,8 +55,8 @@ fn goes_on(filter: &mut Small) {
     }
 }
 
-/// Restores some contents; a filter that refuses them must not have changed. Tells whether it took them.
-fn bears(bytes: &[u8]) -> bool {
+/// Restores section contents and returns whether the filter accepted them. A filter that refuses them must not change.
+fn accepts(bytes: &[u8]) -> bool {
     let mut filter = Box::new(Small::new());
     filter.start(RobustConfig::DEFAULT.with_hypotheses(3), 1).unwrap();
     for steps in [500, 800, 500, 1100] {
@@ -66,7 +66,7 @@ fn bears(bytes: &[u8]) -> bool {
     let snapshot = wrapped(bytes);
     match filter.restore(section(&snapshot)) {
         Ok(()) => {
-            goes_on(&mut filter);
+            exercise(&mut filter);
             true
         }
         Err(error) => {
@@ -83,7 +83,7 @@ proptest! {
     #![proptest_config(cases(1500))]
 
     #[test]
-    fn changed_contents_with_a_right_crc_are_refused_or_borne(
+    fn mutated_contents_with_a_valid_crc_are_refused_or_usable(
         which in any::<prop::sample::Index>(),
         changes in vec((any::<prop::sample::Index>(), prop_oneof![any::<u8>(), Just(0), Just(255), 0_u8..8]), 1..4),
     ) {
@@ -92,21 +92,21 @@ proptest! {
             let at = at.index(bytes.len());
             bytes[at] = if at == MOVES_AT { byte & 3 } else { byte };
         }
-        bears(&bytes);
+        accepts(&bytes);
     }
 }
 
 #[test]
-fn every_byte_at_its_bounds_is_refused_or_borne() {
+fn every_byte_at_its_bounds_is_refused_or_usable() {
     let mut taken = 0;
     let mut tried = 0;
     for bytes in CONTENTS.iter().step_by(29) {
-        // 255 moves at every place would take minutes.
+        // 255 moves at every place take minutes.
         for at in (0..bytes.len()).filter(|&at| at != MOVES_AT) {
             for byte in [0, bytes[at] ^ 1, bytes[at].wrapping_add(1), 127, 255] {
                 let mut changed = bytes.clone();
                 changed[at] = byte;
-                taken += usize::from(bears(&changed));
+                taken += usize::from(accepts(&changed));
                 tried += 1;
             }
         }
@@ -116,29 +116,29 @@ fn every_byte_at_its_bounds_is_refused_or_borne() {
 }
 
 #[test]
-fn contents_that_are_cut_or_too_long_are_refused() {
+fn truncated_and_overlong_contents_are_refused() {
     for bytes in CONTENTS.iter().step_by(9) {
-        assert!(bears(bytes));
-        assert!((0..bytes.len()).all(|kept| !bears(&bytes[..kept])));
-        assert!(!bears(&[bytes, &[0][..]].concat()));
+        assert!(accepts(bytes));
+        assert!((0..bytes.len()).all(|kept| !accepts(&bytes[..kept])));
+        assert!(!accepts(&[bytes, &[0][..]].concat()));
     }
 }
 
 #[test]
-fn a_snapshot_without_any_hypothesis_is_refused_because_no_filter_could_go_on_with_it() {
+fn a_snapshot_without_hypotheses_is_refused() {
     let mut filter = Box::new(Small::new());
     filter.start(RobustConfig::DEFAULT.with_hypotheses(3), 1).unwrap();
     let bytes = contents(&saved(&mut filter, ROOM).unwrap());
-    assert!(bears(&bytes));
-    // Vertices, the place before, whether counts left the history, surplus and faded: all there is of a hypothesis of nothing.
+    assert!(accepts(&bytes));
+    // An empty hypothesis: vertices, the vertex before the history, whether anything was marginalised, and two floats.
     let (rest, _hypothesis) = bytes.split_at(bytes.len() - 11);
     let (count, before) = rest.split_last().unwrap();
     assert_eq!(*count, 1);
-    assert!(!bears(&[before, &[0]].concat()));
+    assert!(!accepts(&[before, &[0]].concat()));
 }
 
 #[test]
-fn a_filter_with_other_capacities_refuses_by_that_name() {
+fn a_snapshot_of_other_capacities_is_refused() {
     let drive = &drives(8)[0];
     let mut filter = drive.start::<3, 6, 12>();
     (0..8).for_each(|index| drop(drive.step(&mut filter, index)));
@@ -147,7 +147,7 @@ fn a_filter_with_other_capacities_refuses_by_that_name() {
     other(RobustFilter::<3, 7, 12>::new().restore(section(&snapshot)));
     other(RobustFilter::<3, 6, 13>::new().restore(section(&snapshot)));
     other(RobustFilter::<2, 6, 12>::new().restore(section(&snapshot)));
-    // More room for hypotheses than the snapshot has is no obstacle.
+    // A filter with room for more hypotheses accepts the snapshot.
     let mut larger = Box::new(RobustFilter::<9, 6, 12>::new());
     assert_eq!(larger.restore(section(&snapshot)), Ok(()));
     assert_eq!(held(&*larger), held(&*filter));

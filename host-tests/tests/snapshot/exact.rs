@@ -1,12 +1,12 @@
-//! The filter that was saved and the one that was restored go on alike, bit for bit.
+//! A restored filter continues exactly like the saved one, bit for bit.
 
 use super::*;
 use toposlam::reference;
 
-/// How long both are watched behind a cut.
+/// The number of places compared after a restore.
 const WATCHED: usize = 14;
 
-/// Cuts a drive at every place; tells how often, and the largest snapshot.
+/// Saves and restores at every place of a drive; returns the number of snapshots and the largest one.
 fn cut_everywhere<const N: usize, const V: usize, const T: usize>(drive: &Drive) -> (usize, usize) {
     let most = RobustFilter::<N, V, T>::SNAPSHOT_BYTES;
     let mut filter = drive.start::<N, V, T>();
@@ -18,8 +18,12 @@ fn cut_everywhere<const N: usize, const V: usize, const T: usize>(drive: &Drive)
         let snapshot = saved(&mut saved_filter, most).unwrap();
         largest = largest.max(snapshot.len());
         let after = held(&saved_filter);
-        assert_eq!(before.told, after.told, "what was told stays told: {} {cut}", drive.name);
-        // Into a filter that has seen something else.
+        assert_eq!(
+            before.published, after.published,
+            "saving does not change the published result: {} {cut}",
+            drive.name
+        );
+        // Restore into a filter with another state.
         let mut restored = drive.start::<N, V, T>();
         (0..cut % 5).for_each(|index| drop(drive.step(&mut restored, index.min(places - 1))));
         restored.restore(section(&snapshot)).unwrap_or_else(|error| panic!("{} {cut}: {error}", drive.name));
@@ -37,7 +41,7 @@ fn cut_everywhere<const N: usize, const V: usize, const T: usize>(drive: &Drive)
 }
 
 #[test]
-fn the_restored_filter_goes_on_as_the_saved_one_wherever_the_drive_is_cut() {
+fn a_filter_restored_at_any_place_continues_bit_for_bit() {
     let (mut cuts, mut largest) = (0, [0; 3]);
     for drive in drives(72) {
         for (size, (more, bytes)) in [
@@ -59,7 +63,7 @@ fn the_restored_filter_goes_on_as_the_saved_one_wherever_the_drive_is_cut() {
     ];
     println!("{cuts} cuts; largest snapshots {largest:?} of {bounds:?} bytes");
     assert!(largest.iter().zip(bounds).all(|(&largest, bound)| largest <= bound));
-    assert_eq!(largest[2], bounds[2], "the bound is reached");
+    assert_eq!(largest[2], bounds[2], "the bound is tight");
 }
 
 #[test]
@@ -68,24 +72,24 @@ fn a_smaller_buffer_holds_fewer_hypotheses_and_the_same_map() {
     let mut filter = drive.start::<6, 16, 40>();
     (0..60).for_each(|index| drop(drive.step(&mut filter, index)));
     let whole = saved(&mut filter, RobustFilter::<6, 16, 40>::SNAPSHOT_BYTES).unwrap();
-    let told = held(&filter);
+    let published = held(&filter);
     let mut sizes = std::collections::BTreeSet::new();
     for room in 0..=whole.len() {
         match saved(&mut filter, room) {
             Ok(snapshot) => {
                 let mut restored = drive.start::<6, 16, 40>();
                 restored.restore(section(&snapshot)).unwrap();
-                assert_eq!(held(&restored), told, "{room}");
+                assert_eq!(held(&restored), published, "{room}");
                 sizes.insert(snapshot.len());
             }
             Err(error) => {
                 assert_eq!(error, SnapshotError::Full);
-                assert!(sizes.is_empty(), "more room is never too little");
+                assert!(sizes.is_empty(), "a larger buffer always suffices");
             }
         }
     }
     println!("snapshots of {sizes:?} bytes");
-    assert_eq!(sizes.len(), 6, "with one hypothesis to all six");
+    assert_eq!(sizes.len(), 6, "one to six hypotheses");
     assert_eq!(sizes.last(), Some(&whole.len()));
 }
 

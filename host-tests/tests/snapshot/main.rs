@@ -1,4 +1,4 @@
-//! A snapshot has all that the filter goes on with, and nothing that is not a snapshot is taken for one.
+//! Snapshots: a restored filter equals the saved one, and invalid snapshots are refused.
 
 mod bad_bytes;
 #[path = "../common/mod.rs"]
@@ -14,16 +14,16 @@ use toposlam::persist::Persist;
 use toposlam::persist::snapshot::{FILTER_SECTION, Reader, Snapshot, SnapshotError, Writer};
 use toposlam::{Filter, Fingerprint, Map, Observation, RobustConfig, RobustFilter, Update, VertexId};
 
-/// A drive: settings of a filter, and what becomes of it.
+/// A drive: the settings of a filter and its observations.
 #[derive(Clone)]
 struct Drive {
     name: &'static str,
     config: RobustConfig,
     /// Whether the filter begins with a map.
     known: bool,
-    /// The robot visits, and the filter refines so often behind each.
+    /// The observations, each with the number of refinement steps after it.
     observations: Vec<(Observation, usize)>,
-    /// From where to where the filter only localises.
+    /// The range of places in which the filter only localises.
     localise: Option<(usize, usize)>,
 }
 
@@ -48,7 +48,7 @@ impl Drive {
         filter
     }
 
-    /// Makes one step; tells what the filter told, and what it then holds.
+    /// Makes one observation; returns the update and the state of the filter after it.
     fn step<const N: usize, const V: usize, const T: usize>(
         &self,
         filter: &mut RobustFilter<N, V, T>,
@@ -64,12 +64,12 @@ impl Drive {
     }
 }
 
-/// All that a filter can be asked.
+/// The observable state of a filter.
 #[derive(Clone, PartialEq, Debug)]
 struct Held {
-    /// What it told last.
-    told: String,
-    /// The evidence of the best hypothesis, and what other paths add, by their bits.
+    /// The last published result.
+    published: String,
+    /// The bits of the evidence of the best hypothesis and of the contribution of other paths.
     evidence: [u32; 2],
 }
 
@@ -83,14 +83,14 @@ fn held<const N: usize, const V: usize, const T: usize>(filter: &RobustFilter<N,
     let renamed: Vec<_> = VertexId::first(V).map(|before| filter.remapped(before)).collect();
     let path: Vec<_> = filter.path().collect();
     let (evidence, surplus) = filter.evidence();
-    let told = format!(
+    let published = format!(
         "{vertices:?} {edges:?} {renamed:?} {path:?} {} {} {} {:?}",
         filter.noise_mm(),
         filter.observed(),
         filter.map_probability_q16(),
         filter.worst()
     );
-    Held { told, evidence: [evidence.to_bits(), surplus.to_bits()] }
+    Held { published, evidence: [evidence.to_bits(), surplus.to_bits()] }
 }
 
 /// Drives of all kinds; the histories of the filters are shorter.
@@ -125,7 +125,7 @@ fn drives(places: usize) -> Vec<Drive> {
             ..plain("localising in between", walk(&six_rooms(), all, 7, &[places / 2]))
         },
     ];
-    // A filter that has to live without room for vertices.
+    // A filter whose vertices are full.
     drives.push(plain("floor again", walk(&floor(), all, 8, &[])));
     drives
 }

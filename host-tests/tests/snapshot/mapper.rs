@@ -1,4 +1,4 @@
-//! A mapper in a snapshot: with other sections, and with the next place where it should be.
+//! Snapshots of a mapper: other sections, and the start of a sequence after a restore.
 
 use toposlam::persist::snapshot::{Resume, Snapshot, SnapshotError, Writer};
 use toposlam::reference::{self, SONARS, VERTICES};
@@ -15,7 +15,7 @@ fn started<F: Filter<VERTICES>>(filter: F::Config) -> Box<Mapper<SONARS, VERTICE
     mapper
 }
 
-/// Drives until the mapper has seen so many places.
+/// Drives until the mapper has observed `places` places.
 fn drive<F: Filter<VERTICES>>(mapper: &mut Mapper<SONARS, VERTICES, F>, simulation: &mut Simulation, places: usize) {
     let mut seen = 0;
     while seen < places {
@@ -29,13 +29,13 @@ fn simulation() -> Simulation {
     Simulation::new(&Plan::built_in("office").unwrap(), RobotModel::default(), 3).unwrap()
 }
 
-/// Which of its places the filter takes to begin a sequence.
-fn begins_of(mapper: &Mapper<SONARS, VERTICES, Notes>) -> Vec<bool> {
+/// For each place, whether it starts a sequence.
+fn starts_of(mapper: &Mapper<SONARS, VERTICES, Notes>) -> Vec<bool> {
     mapper.filter().observations.iter().map(|observation| observation.starts_sequence).collect()
 }
 
 #[test]
-fn the_next_place_begins_a_sequence_when_the_robot_may_be_elsewhere() {
+fn a_restore_at_an_unknown_vertex_starts_a_sequence() {
     let mut buffer = [0; 64];
     let length = started::<Notes>(5).snapshot(&mut buffer).unwrap();
     for (resume, starts_sequence) in [(Resume::AtUnknownVertex, true), (Resume::InPlace, false)] {
@@ -43,20 +43,20 @@ fn the_next_place_begins_a_sequence_when_the_robot_may_be_elsewhere() {
         mapper.restore(&buffer[..length], resume).unwrap();
         assert_eq!(mapper.filter().history, 5);
         drive(&mut mapper, &mut simulation(), 3);
-        assert_eq!(begins_of(&mapper), [starts_sequence, false, false]);
+        assert_eq!(starts_of(&mapper), [starts_sequence, false, false]);
     }
-    // Refused bytes and a new start leave nothing behind.
+    // Refused bytes have no effect, and a start resets the state.
     let mut mapper = started::<Notes>(9);
     assert_eq!(mapper.restore(&buffer[..length - 1], Resume::AtUnknownVertex), Err(SnapshotError::TooShort));
     mapper.restore(&buffer[..length], Resume::AtUnknownVertex).unwrap();
     let config = MapperConfig::new(reference::RING, 9).with_place(reference::PLACE).with_seed(1);
     mapper.start(&config).unwrap();
     drive(&mut mapper, &mut simulation(), 1);
-    assert_eq!((begins_of(&mapper), mapper.filter().history), (vec![false], 9));
+    assert_eq!((starts_of(&mapper), mapper.filter().history), (vec![false], 9));
 }
 
 #[test]
-fn sections_of_other_stages_are_kept_beside_the_mapper_s_and_skipped() {
+fn sections_of_other_stages_are_preserved_and_skipped() {
     let mut buffer = [0; 128];
     let mut writer = Writer::new(&mut buffer).unwrap();
     writer.section(77, |section| section.u32(4711)).unwrap();
@@ -72,13 +72,13 @@ fn sections_of_other_stages_are_kept_beside_the_mapper_s_and_skipped() {
 }
 
 #[test]
-fn a_robot_that_is_restored_in_the_middle_of_its_drive_ends_with_the_same_map() {
+fn a_robot_restored_during_a_drive_ends_with_the_same_map() {
     let mut buffer = [0; reference::SNAPSHOT_BYTES];
     let mut simulation = simulation();
     let mut mapper = started::<reference::Filter>(reference::FILTER);
     drive(&mut mapper, &mut simulation, 40);
     let length = mapper.snapshot(&mut buffer).unwrap();
-    // The detector of the restored mapper has heard nothing yet, so it is tried where the robot is between two places.
+    // The detector of the restored mapper is empty, so the restore is between two places.
     let mut restored = mapper.clone();
     restored.start(&reference::MAPPER).unwrap();
     restored.restore(&buffer[..length], Resume::InPlace).unwrap();

@@ -1,4 +1,4 @@
-//! `docs/snapshot.md` is the specification: snapshots are read here by its tables alone.
+//! `docs/snapshot.md` is the specification: this test reads snapshots by its tables alone.
 
 use super::*;
 use std::collections::HashMap;
@@ -100,7 +100,7 @@ fn check<const N: usize, const V: usize, const T: usize>(drive: &Drive) {
 }
 
 #[test]
-fn snapshots_are_what_the_tables_say() {
+fn snapshots_match_the_tables() {
     for drive in drives(60) {
         check::<4, 12, 24>(&drive);
         check::<3, 20, 16>(&drive);

@@ -1,4 +1,4 @@
-//! What a robot starts with.
+//! The map of a robot after a start.
 
 use super::*;
 use toposlam::drive::VelocityCommand;
@@ -13,7 +13,7 @@ use toposlam_sim::world::{Plan, RobotModel, Simulation};
 
 type Robot16 = Box<reference::RobotMapper>;
 
-/// A robot that drove so far, and its store.
+/// A robot after `places` places, and its store with a snapshot every `every` places.
 fn after(places: u32, every: u32) -> (Robot16, Store<Sectors>) {
     let mut store = Store::mount(Sectors::new(8), reference::STORE).unwrap();
     let (mut mapper, ..) = start(&mut store, BootPolicy::Fresh);
@@ -34,7 +34,7 @@ fn after(places: u32, every: u32) -> (Robot16, Store<Sectors>) {
     (mapper, store)
 }
 
-/// A robot that starts, what it found, and the number of the start as far as it could be counted.
+/// A started robot, its boot report, and the number of the start if it could be counted.
 fn start(store: &mut Store<Sectors>, policy: BootPolicy) -> (Robot16, BootReport, Option<u32>) {
     let mut mapper = Robot16::new(reference::RobotMapper::new());
     let mut buffer = [0; reference::SNAPSHOT_BYTES];
@@ -45,7 +45,7 @@ fn start(store: &mut Store<Sectors>, policy: BootPolicy) -> (Robot16, BootReport
 }
 
 #[test]
-fn the_policy_says_whether_the_robot_goes_on_with_its_map() {
+fn the_boot_policy_decides_whether_the_map_is_restored() {
     let (mapper, mut store) = after(30, 10);
     let (fresh, report, number) = start(&mut store, BootPolicy::Fresh);
     assert_eq!((fresh.map().vertices().len(), report.outcome, number), (0, BootOutcome::Fresh, Some(2)));
@@ -59,7 +59,7 @@ fn the_policy_says_whether_the_robot_goes_on_with_its_map() {
 }
 
 #[test]
-fn the_robot_introduces_itself_with_the_number_of_its_start() {
+fn the_hello_has_the_number_of_the_start() {
     let mut store = Store::mount(Sectors::new(8), reference::STORE).unwrap();
     for number in 1..5 {
         let boot = store.count_start().unwrap();
@@ -74,7 +74,7 @@ fn the_robot_introduces_itself_with_the_number_of_its_start() {
     }
 }
 
-/// A board that notes the number of the start which the robot sends.
+/// A board that records the boot number in the robot's `Hello`.
 struct Line {
     decoder: Decoder,
     boot: Option<u32>,
@@ -110,7 +110,7 @@ impl Board for Line {
 }
 
 #[test]
-fn snapshots_that_cannot_be_taken_give_way_to_the_one_before() {
+fn an_invalid_snapshot_falls_back_to_the_previous_one() {
     let (mapper, mut store) = after(20, 20);
     let mut damaged = newest(&mut store).unwrap();
     damaged[100] ^= 1;
@@ -122,7 +122,7 @@ fn snapshots_that_cannot_be_taken_give_way_to_the_one_before() {
     let (restored, report, _) = start(&mut store, BootPolicy::ContinueAtUnknownVertex);
     assert_eq!((report.rejected, report.why), (2, Some(SnapshotError::Corrupt)));
     assert_eq!(restored.filter().observed(), 20);
-    // Of another robot.
+    // A snapshot of a filter with other capacities.
     let mut other = RobustOther::UNSTARTED;
     other.start(reference::FILTER, 1).unwrap();
     let mut buffer = [0; reference::SNAPSHOT_BYTES];
@@ -137,7 +137,7 @@ fn snapshots_that_cannot_be_taken_give_way_to_the_one_before() {
 type RobustOther = toposlam::RobustFilter<10, 16, 100>;
 
 #[test]
-fn without_a_snapshot_or_without_a_flash_the_robot_starts_afresh() {
+fn without_a_snapshot_or_a_flash_the_map_is_empty() {
     let mut store = Store::mount(Sectors::new(8), reference::STORE).unwrap();
     let (mapper, report, _) = start(&mut store, BootPolicy::ContinueInPlace);
     assert_eq!((report.outcome, report.store, mapper.map().vertices().len()), (BootOutcome::Nothing, None, 0));

@@ -1,19 +1,19 @@
-//! A power cut in every single write and erase of a drive.
+//! Power cuts in every write and erase of a drive.
 
 use super::*;
 use rayon::prelude::*;
 use toposlam::persist::store::StoreError;
 use toposlam_sim::chip::{Cut, Tear};
 
-/// What a drive with cuts in it came to.
+/// Results of the power cuts of a drive.
 #[derive(Clone, Copy, Debug, Default)]
 struct Figures {
-    /// How many operations of the flash the drive without cuts took.
+    /// The number of flash operations of the drive without cuts.
     operations: u64,
     cuts: u64,
-    /// Cuts in the start that followed a cut, and in the storing that followed that.
+    /// Second cuts: during the start after a cut, and during the next save.
     second_cuts: u64,
-    /// How often the snapshot that was being stored was there after the cut, and how often the one before.
+    /// Cuts after which the store had the new snapshot; below, the previous one and none.
     newest: u64,
     before: u64,
     none: u64,
@@ -34,7 +34,7 @@ impl std::ops::Add for Figures {
     }
 }
 
-/// A start of the robot: the store is looked through, and the start is counted.
+/// A start of the robot: mounts the store and counts the start.
 fn start<const W: usize, const E: usize>(
     flash: FlashModel<W, E>,
     range: std::ops::Range<u32>,
@@ -50,7 +50,7 @@ fn tears(operation: u64) -> [Tear; 5] {
     [Tear::Done, Tear::FirstHalf, Tear::LastHalf, bits(0), bits(1)]
 }
 
-/// One storing of a snapshot: what the store was before, how many operations it takes, and which snapshot it is.
+/// One save: the store before it, its flash operations, and the index of the snapshot.
 struct Step<const W: usize, const E: usize> {
     store: Store<FlashModel<W, E>>,
     operations: std::ops::Range<u64>,
@@ -58,7 +58,7 @@ struct Step<const W: usize, const E: usize> {
 }
 
 impl<const W: usize, const E: usize> Step<W, E> {
-    /// Cuts the power in every operation of the step, and after one of so many cuts once more.
+    /// Cuts the power in every operation of the step, and a second time after one in `thinned` operations.
     fn cut_everywhere(&self, drive: &Drive, thinned: u64) -> Figures {
         let mut figures = Figures { operations: self.operations.end - self.operations.start, ..Figures::default() };
         let before = self.index.checked_sub(1).map(|before| &drive.snapshots[before]);
@@ -81,7 +81,7 @@ impl<const W: usize, const E: usize> Step<W, E> {
         figures
     }
 
-    /// The flash, with power again, after a cut in the middle of storing.
+    /// The flash after a power cut during a save, with the power on again.
     fn until(&self, cut: Cut, snapshot: &[u8]) -> FlashModel<W, E> {
         let mut store = self.store.clone();
         store.flash_mut().cut_power(Some(cut));
@@ -92,7 +92,8 @@ impl<const W: usize, const E: usize> Step<W, E> {
         flash
     }
 
-    /// After a cut the store has one of two snapshots, or none if that is the first, and takes the next; tells what it has.
+    /// Asserts that after a cut the store has one of two snapshots, or none before the first, and stores the next one.
+    /// Returns the snapshot found.
     fn check<'a>(
         &self,
         flash: FlashModel<W, E>,
@@ -101,10 +102,10 @@ impl<const W: usize, const E: usize> Step<W, E> {
     ) -> Option<&'a Vec<u8>> {
         let starts = self.store.starts();
         let mut store = start(flash, drive.range.clone()).unwrap();
-        assert!(store.starts() > starts, "starts are counted on");
+        assert!(store.starts() > starts, "the number of starts increases");
         let found = newest(&mut store);
         let found = either.into_iter().find(|one| found.as_ref() == *one);
-        assert!(found.is_some(), "snapshot {} and what was before are lost", self.index);
+        assert!(found.is_some(), "snapshot {} and the previous one are lost", self.index);
         let next = drive.next(self.index);
         store.save(next).unwrap();
         assert_eq!(newest(&mut store).as_ref(), Some(next));
@@ -113,7 +114,7 @@ impl<const W: usize, const E: usize> Step<W, E> {
         found.flatten()
     }
 
-    /// Cuts the power again in every operation of the start, and of the storing that follows; tells how often.
+    /// Cuts the power again in every operation of the start and of the next save; returns the number of cuts.
     fn cut_again(&self, flash: &FlashModel<W, E>, drive: &Drive, found: Option<&Vec<u8>>) -> u64 {
         let next = drive.next(self.index);
         let go_on = |flash: &mut FlashModel<W, E>| {
@@ -136,7 +137,7 @@ impl<const W: usize, const E: usize> Step<W, E> {
     }
 }
 
-/// What is stored, and where.
+/// The snapshots of a drive, and the range of flash that stores them.
 struct Drive {
     snapshots: Vec<Vec<u8>>,
     range: std::ops::Range<u32>,

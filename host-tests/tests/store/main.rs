@@ -1,4 +1,4 @@
-//! The map survives: whatever the flash is left in, the store has the newest snapshot that was complete, and goes on.
+//! The store: in any state of the flash, it returns the newest complete snapshot and stores the next one.
 
 mod boot;
 #[path = "../common/mod.rs"]
@@ -14,11 +14,11 @@ use toposlam::wire::map_digest;
 use toposlam::{Filter, RobustConfig, reference};
 use toposlam_sim::chip::FlashModel;
 
-/// The two last sectors of the reference robot's flash, and pages as an nRF52840 has them.
+/// The two last sectors of the reference robot's flash, and the pages of an nRF52840.
 type Sectors = FlashModel<1, { 128 * 1024 }>;
 type Pages = FlashModel<4, 4096>;
 
-/// The snapshots of a drive after some places, one with every so many more; each is one that a filter takes.
+/// `count` valid snapshots of a drive, one per `every` places after the first `places`.
 fn snapshots(places: usize, count: usize, every: usize) -> Vec<Vec<u8>> {
     let environment = floor();
     let hints = Hints { turn: true, degree: true, missing_percent: 10, wrong_percent: 2 };

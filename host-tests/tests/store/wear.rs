@@ -1,10 +1,10 @@
-//! How long the flash lasts, and what becomes of a store that is not as it was left.
+//! Wear levelling, capacity, and stores with foreign or damaged contents.
 
 use super::*;
 use toposlam::persist::store::StoreError;
 use toposlam_sim::chip::FlashFault;
 
-/// Stores so many times; tells the erases of each sector.
+/// Saves repeatedly; returns the erases of each sector.
 fn worn<const W: usize, const E: usize>(sectors: usize, snapshots: &[Vec<u8>], times: usize) -> Vec<u32> {
     let mut store = Store::mount(FlashModel::<W, E>::new(sectors), 0..(sectors * E) as u32).unwrap();
     let mut bytes = 0;
@@ -26,7 +26,7 @@ fn worn<const W: usize, const E: usize>(sectors: usize, snapshots: &[Vec<u8>], t
 }
 
 #[test]
-fn every_sector_is_erased_as_often_as_every_other() {
+fn all_sectors_wear_evenly() {
     let snapshots = snapshots(440, 8, 10);
     for erases in [
         worn::<1, { 128 * 1024 }>(2, &snapshots, 200),
@@ -39,9 +39,9 @@ fn every_sector_is_erased_as_often_as_every_other() {
 }
 
 #[test]
-// A range that runs backwards is one of those that must be refused.
+// A reversed range must be refused too.
 #[allow(clippy::reversed_empty_ranges)]
-fn a_range_that_is_no_even_number_of_sectors_in_the_flash_is_refused() {
+fn a_range_without_an_even_number_of_sectors_in_the_flash_is_refused() {
     for range in [0..0, 0..4096, 0..3 * 4096, 1..8193, 4096..2 * 4096, 8192..4096, 24_576..40_960] {
         let refused = Store::mount(Pages::new(8), range.clone()).err();
         assert_eq!(refused, Some(StoreError::Range), "{range:?}");
@@ -51,7 +51,7 @@ fn a_range_that_is_no_even_number_of_sectors_in_the_flash_is_refused() {
 }
 
 #[test]
-fn what_is_just_small_enough_fits_and_what_is_larger_is_refused_before_anything_is_lost() {
+fn the_largest_snapshot_fits_and_a_larger_one_is_refused_without_loss() {
     let mut store = Store::mount(Pages::new(8), 0..32_768).unwrap();
     let largest = store.largest();
     println!(
@@ -68,13 +68,13 @@ fn what_is_just_small_enough_fits_and_what_is_larger_is_refused_before_anything_
     }
     assert_eq!(store.save(&bytes), Err(StoreError::TooLarge));
     assert_eq!(store.newest(&mut buffer).unwrap().unwrap().length, largest);
-    // A buffer that is too small for the newest gets an older one.
+    // A buffer that is too small for the newest snapshot receives an older one.
     let kept = store.newest(&mut buffer[..100]).unwrap();
     assert!(kept.is_none_or(|kept| kept.length <= 100));
 }
 
 #[test]
-fn older_snapshots_are_there_behind_the_newest_until_all_are_erased() {
+fn older_snapshots_remain_readable_until_erased() {
     let mut store = Store::mount(Sectors::new(2), 0..262_144).unwrap();
     for number in 0..9_u8 {
         store.save(&[number; 600]).unwrap();
@@ -96,7 +96,7 @@ fn older_snapshots_are_there_behind_the_newest_until_all_are_erased() {
 }
 
 #[test]
-fn a_flash_that_is_full_of_anything_is_taken_as_empty() {
+fn a_flash_with_foreign_contents_is_treated_as_empty() {
     let mut state = 1_u64;
     for round in 0..40 {
         let mut flash = Pages::new(8);
@@ -120,8 +120,8 @@ fn a_flash_that_is_full_of_anything_is_taken_as_empty() {
 }
 
 #[test]
-fn a_half_that_the_store_did_not_erase_is_erased_before_it_is_written() {
-    // The beginnings are erased, and so are the marks of the queue; what lies behind may be what a torn erase left.
+fn a_half_not_erased_by_the_store_is_erased_before_use() {
+    // The start of each page is erased, the marks of the queue included; the rest may remain from an interrupted erase.
     let mut flash = Pages::new(8);
     (0..8).for_each(|page| flash.bytes_mut()[page * 4096 + 3000..][..100].fill(0xAB));
     let mut store = Store::mount(flash, 0..32_768).unwrap();
@@ -132,7 +132,7 @@ fn a_half_that_the_store_did_not_erase_is_erased_before_it_is_written() {
 }
 
 #[test]
-fn a_damaged_byte_costs_one_snapshot_and_not_the_others() {
+fn a_damaged_byte_invalidates_at_most_one_snapshot() {
     let mut store = Store::mount(Pages::new(8), 0..32_768).unwrap();
     for number in 0..4_u8 {
         store.save(&[number; 2000]).unwrap();
@@ -149,7 +149,7 @@ fn a_damaged_byte_costs_one_snapshot_and_not_the_others() {
     }
 }
 
-/// A flash that says it has written and has not.
+/// A flash whose writes succeed without effect.
 struct Deaf(Pages);
 
 impl embedded_storage::nor_flash::ErrorType for Deaf {
@@ -182,7 +182,7 @@ impl embedded_storage::nor_flash::NorFlash for Deaf {
 }
 
 #[test]
-fn a_flash_that_does_not_keep_what_is_written_is_found_out() {
+fn a_flash_that_loses_writes_is_detected() {
     use embedded_storage::nor_flash::ReadNorFlash;
     let mut store = Store::mount(Deaf(Pages::new(8)), 0..32_768).unwrap();
     assert_eq!(store.flash_mut().capacity(), 32_768);

@@ -1,4 +1,4 @@
-//! Requests and replies: every command there and back, snapshots in pieces, and lines that lose either.
+//! Requests and replies: every command with its outcome, snapshots in chunks, and lines that lose requests or replies.
 
 use super::console::{Damage, Direction, FakeLine, FakeRobot, TURNS};
 use super::robot::Random;
@@ -12,7 +12,7 @@ use toposlam_link::listener::{Event, Listener};
 
 type FakeClient = Client<FakeLine, fn(&Listener, Event<'_>)>;
 
-/// A client of a fake robot, over a line that damages.
+/// A client of a fake robot over a line with this damage.
 fn client(damage: Damage) -> (FakeClient, Rc<RefCell<FakeRobot>>) {
     let line = FakeLine::new(damage);
     let robot = line.robot();
@@ -26,7 +26,7 @@ fn good_line() -> Damage {
 }
 
 #[test]
-fn every_command_reaches_the_robot_as_it_was_given_and_its_outcome_comes_back() {
+fn every_command_is_executed_unchanged_and_its_outcome_is_returned() {
     let (mut client, robot) = client(good_line());
     for sent in [requests(), largest_requests()].concat() {
         let outcome = client.request(sent.command).unwrap();
@@ -38,11 +38,11 @@ fn every_command_reaches_the_robot_as_it_was_given_and_its_outcome_comes_back() 
         });
         assert_eq!(replies.next_back(), Some(outcome));
     }
-    assert_eq!(robot.borrow().executed.len(), 2 * requests().len(), "each once");
+    assert_eq!(robot.borrow().executed.len(), 2 * requests().len(), "each command is executed once");
 }
 
 #[test]
-fn what_is_set_is_what_the_robot_says_of_itself() {
+fn the_info_reply_reflects_the_state_set_by_commands() {
     let (mut client, robot) = client(good_line());
     client.order(Command::LocaliseOnly { on: true }).unwrap();
     client.order(Command::Pause { on: true }).unwrap();
@@ -57,7 +57,7 @@ fn what_is_set_is_what_the_robot_says_of_itself() {
 }
 
 #[test]
-fn the_map_comes_when_it_is_asked_for() {
+fn a_map_request_sends_the_whole_map() {
     let (mut client, robot) = client(good_line());
     for _ in 0..TURNS {
         robot.borrow_mut().turn(&[]);
@@ -69,12 +69,12 @@ fn the_map_comes_when_it_is_asked_for() {
     let robot = robot.borrow();
     assert!(replica.edges().eq(robot.mapper.map().edges().map(|(a, b)| (a.into(), b.into()))));
     assert_eq!(usize::from(replica.vertices()), robot.mapper.map().vertices().len());
-    assert!(robot.said.len() - turns < vertices + 20, "no more than the replica was sent");
+    assert!(robot.said.len() - turns < vertices + 20, "only the map was sent");
     assert!(replica.hello().is_some());
 }
 
 #[test]
-fn a_reset_robot_tells_that_every_vertex_is_gone() {
+fn a_reset_removes_every_vertex_of_the_replica() {
     let (mut client, robot) = client(good_line());
     for _ in 0..TURNS {
         robot.borrow_mut().turn(&[]);
@@ -88,10 +88,10 @@ fn a_reset_robot_tells_that_every_vertex_is_gone() {
 }
 
 #[test]
-fn snapshots_cross_the_line_whole_both_ways() {
+fn snapshots_are_transferred_unchanged_in_both_directions() {
     let (mut client, robot) = client(good_line());
     assert_eq!(client.snapshot().unwrap(), [1; 150]);
-    assert_eq!(client.snapshot().unwrap(), [2; 150], "each is taken anew");
+    assert_eq!(client.snapshot().unwrap(), [2; 150], "each request takes a new snapshot");
     for length in [1, CHUNK_BYTES - 1, CHUNK_BYTES, CHUNK_BYTES + 1, 300] {
         let snapshot: Vec<u8> = (0..length).map(|byte| byte as u8).collect();
         client.restore(&snapshot).unwrap();
@@ -100,12 +100,12 @@ fn snapshots_cross_the_line_whole_both_ways() {
     for (bad, refusal) in [(&[0; 301][..], Refusal::TooLong), (&[], Refusal::BadSnapshot)] {
         let refused = client.restore(bad);
         assert!(matches!(refused, Err(ClientError::Refused(why)) if why == refusal), "{refused:?}");
-        assert_eq!(robot.borrow().restored.len(), 300, "what is refused changes nothing");
+        assert_eq!(robot.borrow().restored.len(), 300, "a refused snapshot changes nothing");
     }
 }
 
 #[test]
-fn lost_requests_and_lost_replies_are_made_up_for_and_each_command_is_executed_once() {
+fn retries_recover_lost_requests_and_replies_and_each_command_is_executed_once() {
     for lost in [Direction::ToRobot, Direction::FromRobot] {
         let mut random = Random(7);
         let (mut client, robot) =
@@ -119,16 +119,16 @@ fn lost_requests_and_lost_replies_are_made_up_for_and_each_command_is_executed_o
         let snapshot: Vec<u8> = (0..=255).collect();
         client.restore(&snapshot).unwrap();
         assert_eq!(robot.borrow().restored, snapshot);
-        assert_eq!(client.snapshot().unwrap(), [1; 150], "taken once, however often asked for");
+        assert_eq!(client.snapshot().unwrap(), [1; 150], "repeated requests take one snapshot");
         assert_eq!(robot.borrow().executed.len(), 1 + 4 + 1 + 3, "{lost:?}");
         client.order(Command::Pause { on: true }).unwrap();
         client.order(Command::Pause { on: true }).unwrap();
-        assert_eq!(robot.borrow().executed.len(), 11, "the same command under another number is another request");
+        assert_eq!(robot.borrow().executed.len(), 11, "the same command with another id is another request");
     }
 }
 
 #[test]
-fn a_robot_that_says_nothing_is_an_error() {
+fn a_silent_robot_is_an_error() {
     let (mut client, _) = client(Box::new(|direction, bytes| match direction {
         Direction::ToRobot => bytes,
         Direction::FromRobot => Vec::new(),

@@ -1,4 +1,4 @@
-//! The main loop of a robot in small, which executes commands, and a line to it that a test can damage.
+//! A minimal main loop that executes commands, and a line to it that a test can damage.
 
 use super::frame;
 use std::cell::RefCell;
@@ -15,7 +15,7 @@ use toposlam_sim::world::{Plan, RobotModel, Simulation};
 /// Turns after which the robot has found some places.
 pub(crate) const TURNS: usize = 2000;
 
-/// The main loop of a robot in small: ring frames, mapper and inbox. Its snapshots are bytes without a meaning.
+/// A minimal main loop: ring frames, mapper and inbox. Its snapshots are arbitrary bytes.
 pub(crate) struct FakeRobot {
     world: Simulation,
     pub(crate) mapper: Box<RobotMapper>,
@@ -63,7 +63,7 @@ impl FakeRobot {
         }
     }
 
-    /// One turn of the main loop with the bytes that came since the last one; gives the bytes that go out.
+    /// Runs one turn of the main loop with the bytes received since the last one; returns the transmitted bytes.
     pub(crate) fn turn(&mut self, bytes: &[u8]) -> Vec<u8> {
         let first = self.said.len();
         bytes.iter().for_each(|&byte| self.inbox.take(byte));
@@ -143,7 +143,7 @@ impl FakeRobot {
         }
     }
 
-    /// Everything that the mapping is made of, in every bit.
+    /// The whole state of the mapper, bit for bit.
     pub(crate) fn mapping(&self) -> String {
         format!("{:?}{:?}", self.mapper.detector(), self.mapper.filter())
     }
@@ -154,7 +154,7 @@ fn hello() -> Hello {
     Hello::new(0, ResetCause::Unknown, reference::SEED, capacities)
 }
 
-/// What a line does to the bytes of one turn, in the given direction.
+/// Damages the bytes of one turn in the given direction.
 pub(crate) type Damage = Box<dyn FnMut(Direction, Vec<u8>) -> Vec<u8>>;
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -1,4 +1,4 @@
-//! Listeners who join late, lose frames or hear them twice.
+//! Convergence of listeners that join late, lose frames or receive them twice.
 
 use super::robot::{Random, Robot, TICKS_PER_HELLO};
 use super::{frame, vertex};
@@ -21,7 +21,7 @@ impl<const V: usize> Listener<V> {
         Self { decoder: Decoder::new(), replica: MapReplica::new() }
     }
 
-    fn hear(&mut self, mut bytes: &[u8]) {
+    fn decode(&mut self, mut bytes: &[u8]) {
         loop {
             bytes = match self.decoder.feed(bytes) {
                 Progress::NeedsMore => return,
@@ -35,7 +35,7 @@ impl<const V: usize> Listener<V> {
     }
 }
 
-/// Whether the replica is the map, vertex by vertex and edge by edge (not by the digest).
+/// Whether the replica equals the map, compared by vertices and edges and not by the digest.
 fn same<const V: usize, const W: usize>(replica: &MapReplica<W>, map: &Map<V>) -> bool {
     usize::from(replica.vertices()) == map.vertices().len()
         && replica.is_complete()
@@ -50,16 +50,16 @@ fn same<const V: usize, const W: usize>(replica: &MapReplica<W>, map: &Map<V>) -
 }
 
 #[test]
-fn a_listener_from_the_start_has_the_map_after_every_place() {
+fn a_listener_from_the_start_is_converged_after_every_place() {
     let mut random = Random(1);
     let mut robot = Robot::<V>::new(1);
     let mut listener = Listener::<64>::new();
     for step in 0..2000 {
         robot.change(&mut random);
         for frame in robot.place(&mut random) {
-            listener.hear(&frame);
+            listener.decode(&frame);
         }
-        // A row with many changes goes out whole, so nothing waits for the rolling replica.
+        // A row with many changes is sent whole, so no change waits for the repeated map.
         assert!(listener.replica.is_converged(), "place {step}");
         assert!(same(&listener.replica, &robot.filter.map), "place {step}");
         assert_eq!(listener.replica.location(), Some(Location::from(&Update { place_index: step, ..robot.update() })));
@@ -70,7 +70,7 @@ fn a_listener_from_the_start_has_the_map_after_every_place() {
 }
 
 #[test]
-fn an_unchanged_map_is_not_sent_again_at_a_place() {
+fn an_unchanged_map_is_not_resent_at_a_place() {
     let mut random = Random(2);
     let mut robot = Robot::<V>::new(1);
     robot.change_hypothesis(&mut random);
@@ -79,7 +79,7 @@ fn an_unchanged_map_is_not_sent_again_at_a_place() {
 }
 
 #[test]
-fn one_new_vertex_and_its_edge_go_out_as_events() {
+fn a_new_vertex_and_its_edge_are_sent_as_events() {
     let mut robot = Robot::<V>::new(1);
     robot.filter.map.add_vertex(Fingerprint::ZERO).expect("there is room");
     robot.place(&mut Random(3));
@@ -104,7 +104,7 @@ fn one_new_vertex_and_its_edge_go_out_as_events() {
     assert_eq!(told, expected);
 }
 
-/// A map of a chain of vertices with these labels, told to a listener.
+/// A chain of vertices with these labels, sent to a listener.
 fn chain(labels: &[u16]) -> (Robot<V>, Listener<V>) {
     let mut robot = Robot::<V>::new(1);
     let mut before = None;
@@ -116,14 +116,14 @@ fn chain(labels: &[u16]) -> (Robot<V>, Listener<V>) {
         }
     }
     let mut listener = Listener::new();
-    robot.place(&mut Random(0)).iter().for_each(|frame| listener.hear(frame));
+    robot.place(&mut Random(0)).iter().for_each(|frame| listener.decode(frame));
     (robot, listener)
 }
 
 #[test]
-fn a_merge_and_new_numbers_take_one_message_and_what_the_merge_itself_changes() {
+fn a_merge_sends_one_remapping_and_the_changed_vertices() {
     let (mut robot, mut listener) = chain(&[100, 200, 300, 400]);
-    // Vertices 3 and 1 are one now; 0 and 2 change places. The chain 0-1-2-3 becomes a star around 1.
+    // Vertices 3 and 1 are merged; 0 and 2 swap ids. The chain 0-1-2-3 becomes a star around 1.
     robot.filter.names = [2, 1, 0, 1].map(|now| Some(vertex(now))).to_vec();
     robot.filter.map.clear();
     for steps in [300, 200, 100] {
@@ -136,7 +136,7 @@ fn a_merge_and_new_numbers_take_one_message_and_what_the_merge_itself_changes() 
     let update = robot.update();
     robot.reporter.update(&robot.filter, &update, |message| {
         told.push(*message);
-        listener.hear(&frame(&mut robot.encoder, message));
+        listener.decode(&frame(&mut robot.encoder, message));
         Ok(())
     });
     let Message::Remapped(renamed) = told[0] else { panic!("{told:?}") };
@@ -147,22 +147,22 @@ fn a_merge_and_new_numbers_take_one_message_and_what_the_merge_itself_changes() 
 }
 
 #[test]
-fn everything_that_was_heard_of_a_vertex_follows_its_new_number() {
+fn all_state_of_a_vertex_follows_its_new_id() {
     let (mut robot, mut listener) = chain(&[100, 200, 300, 400]);
     robot.filter.location = vertex(2);
     robot.filter.worst =
         WorstNgram { distance_mm: 50, length: 3, newest_age: 1, vertices: [3, 2, 1, 0, 0, 0, 0].map(vertex) };
-    robot.place(&mut Random(0)).iter().for_each(|frame| listener.hear(frame));
+    robot.place(&mut Random(0)).iter().for_each(|frame| listener.decode(frame));
     let rename = |listener: &mut Listener<V>, robot: &mut Robot<V>, names: &[u8]| {
         let renamed = Remapped { place_index: 2, vertices: List::new(names.iter().copied()) };
-        listener.hear(&frame(&mut robot.encoder, &Message::Remapped(renamed)));
+        listener.decode(&frame(&mut robot.encoder, &Message::Remapped(renamed)));
     };
     let likely = |listener: &Listener<V>| -> Vec<(u8, u16)> {
-        let belief = listener.replica.belief().expect("it was told");
+        let belief = listener.replica.belief().expect("a belief was sent");
         belief.vertices.as_slice().iter().map(|&VertexProbability { vertex, permille }| (vertex, permille)).collect()
     };
     assert_eq!(likely(&listener), [(2, 667), (1, 167), (3, 167)]);
-    // 1 and 3 are one now, with number 0; 0 has number 1.
+    // 1 and 3 are merged and have id 0; 0 has id 1.
     rename(&mut listener, &mut robot, &[1, 0, 2, 0]);
     assert_eq!(listener.replica.location().map(|location| location.vertex), Some(2));
     assert_eq!(likely(&listener), [(2, 667), (0, 334)]);
@@ -171,7 +171,7 @@ fn everything_that_was_heard_of_a_vertex_follows_its_new_number() {
     assert_eq!(listener.replica.row(0).map(|row| row.radius_mm), Some(400));
     assert_eq!(listener.replica.vertices(), 3);
     assert!(!listener.replica.is_converged());
-    // The vertex of the location is gone, and with it what was said of it.
+    // The vertex of the location was removed, and so was all that refers to it.
     rename(&mut listener, &mut robot, &[0, 1, 255]);
     assert_eq!((listener.replica.location(), listener.replica.worst()), (None, None));
     assert_eq!(likely(&listener), [(0, 334)]);
@@ -179,27 +179,27 @@ fn everything_that_was_heard_of_a_vertex_follows_its_new_number() {
 }
 
 #[test]
-fn a_listener_that_lost_the_new_numbers_has_the_map_after_one_round_of_the_repeated_map() {
+fn a_lost_remapping_is_repaired_by_one_round_of_the_repeated_map() {
     let mut random = Random(5);
     for _ in 0..200 {
         let mut robot = Robot::<V>::new(1);
         let mut listener = Listener::<V>::new();
         for _ in 0..40 {
             robot.drive(&mut random);
-            robot.place(&mut random).iter().for_each(|frame| listener.hear(frame));
+            robot.place(&mut random).iter().for_each(|frame| listener.decode(frame));
         }
         robot.repair(&mut random);
-        // The frames are numbered; the first is the one that says which vertex is which.
-        robot.place(&mut random).iter().skip(1).for_each(|frame| listener.hear(frame));
+        // The first frame is the `Remapped`.
+        robot.place(&mut random).iter().skip(1).for_each(|frame| listener.decode(frame));
         for _ in 0..robot.filter.map.vertices().len() + 4 {
-            robot.tick(&mut random).iter().for_each(|frame| listener.hear(frame));
+            robot.tick(&mut random).iter().for_each(|frame| listener.decode(frame));
         }
         assert!(listener.replica.is_converged() && same(&listener.replica, &robot.filter.map));
     }
 }
 
 #[test]
-fn a_late_listener_has_everything_after_one_round_of_the_repeated_map() {
+fn a_late_listener_converges_after_one_round_of_the_repeated_map() {
     let mut random = Random(4);
     for joined_at in 0..100 {
         let mut robot = Robot::<V>::new(1);
@@ -215,7 +215,7 @@ fn a_late_listener_has_everything_after_one_round_of_the_repeated_map() {
         for _ in 0..robot.filter.map.vertices().len() + 4 {
             assert!(!listener.replica.is_converged() || same(&listener.replica, &robot.filter.map));
             for frame in robot.tick(&mut random) {
-                listener.hear(&frame);
+                listener.decode(&frame);
             }
         }
         assert!(listener.replica.is_converged() && same(&listener.replica, &robot.filter.map), "joined at {joined_at}");
@@ -224,16 +224,20 @@ fn a_late_listener_has_everything_after_one_round_of_the_repeated_map() {
         assert_eq!(listener.replica.fault(FaultKind::BusError), 1);
         for _ in 0..TICKS_PER_HELLO {
             for frame in robot.tick(&mut random) {
-                listener.hear(&frame);
+                listener.decode(&frame);
             }
         }
         assert!(listener.replica.hello().is_some_and(|hello| hello.check().is_ok()));
     }
 }
 
-/// Runs a robot over a bad line and holds the listener to what it claims: whenever it says that it has converged, its
-/// map is the robot's. Returns the share of ticks, in percent, after which it said so.
-fn hold_to_its_word(seed: u64, refused_percent: usize, mut line: impl FnMut(&mut Random, Vec<u8>) -> Vec<u8>) -> usize {
+/// Runs a robot over a bad line and asserts that a converged replica equals the robot's map. Returns the percentage of
+/// ticks after which the replica was converged.
+fn assert_converged_is_correct(
+    seed: u64,
+    refused_percent: usize,
+    mut line: impl FnMut(&mut Random, Vec<u8>) -> Vec<u8>,
+) -> usize {
     let mut random = Random(seed);
     let mut robot = Robot::<V>::new(1);
     robot.refused_percent = refused_percent;
@@ -242,19 +246,19 @@ fn hold_to_its_word(seed: u64, refused_percent: usize, mut line: impl FnMut(&mut
     for _ in 0..200 {
         robot.change(&mut random);
         let mut frames = robot.place(&mut random);
-        // A frame that nobody loses closes the update: silence alone tells a listener nothing.
+        // The last frame of an update is never lost, so that the listener detects the gaps before it.
         let update = robot.update();
         frames.push(frame(&mut robot.encoder, &Message::Evidence(Evidence::from(&update))));
-        let (closing, open) = frames.split_last().expect("there is one");
+        let (closing, open) = frames.split_last().expect("an update has a frame");
         for frame in open {
-            listener.hear(&line(&mut random, frame.clone()));
+            listener.decode(&line(&mut random, frame.clone()));
         }
-        listener.hear(&[0]);
-        listener.hear(closing);
+        listener.decode(&[0]);
+        listener.decode(closing);
         assert!(!listener.replica.is_converged() || same(&listener.replica, &robot.filter.map), "seed {seed}");
         for _ in 0..30 {
             for frame in robot.tick(&mut random) {
-                listener.hear(&line(&mut random, frame));
+                listener.decode(&line(&mut random, frame));
                 assert!(!listener.replica.is_converged() || same(&listener.replica, &robot.filter.map), "seed {seed}");
             }
             ticks += 1;
@@ -262,31 +266,32 @@ fn hold_to_its_word(seed: u64, refused_percent: usize, mut line: impl FnMut(&mut
         }
     }
     robot.refused_percent = 0;
-    listener.hear(&[0]);
+    listener.decode(&[0]);
     for _ in 0..robot.filter.map.vertices().len() + 4 {
         for frame in robot.tick(&mut random) {
-            listener.hear(&frame);
+            listener.decode(&frame);
         }
     }
     assert!(
         listener.replica.is_converged() && same(&listener.replica, &robot.filter.map),
-        "once the line is good again"
+        "the replica converges over a good line"
     );
     100 * converged / ticks
 }
 
 #[test]
-fn a_third_of_the_frames_lost_delays_the_map_and_never_falsifies_it() {
+fn lost_frames_delay_convergence_without_false_positives() {
     for seed in 0..20 {
-        let share = hold_to_its_word(seed, 0, |random, frame| if random.happens(30) { vec![] } else { frame });
+        let share =
+            assert_converged_is_correct(seed, 0, |random, frame| if random.happens(30) { vec![] } else { frame });
         assert!(share > 10, "converged after {share} % of the ticks");
     }
 }
 
 #[test]
-fn damaged_and_repeated_frames_delay_the_map_and_never_falsify_it() {
+fn damaged_and_repeated_frames_delay_convergence_without_false_positives() {
     for seed in 20..40 {
-        let share = hold_to_its_word(seed, 0, |random, mut frame| match random.below(10) {
+        let share = assert_converged_is_correct(seed, 0, |random, mut frame| match random.below(10) {
             0 => {
                 let place = random.below(frame.len());
                 frame[place] ^= 1 << random.below(8);
@@ -301,15 +306,15 @@ fn damaged_and_repeated_frames_delay_the_map_and_never_falsify_it() {
 }
 
 #[test]
-fn a_full_transmit_queue_delays_the_map_and_never_falsifies_it() {
+fn a_full_transmit_queue_delays_convergence_without_false_positives() {
     for seed in 40..60 {
-        let share = hold_to_its_word(seed, 30, |_, frame| frame);
+        let share = assert_converged_is_correct(seed, 30, |_, frame| frame);
         assert!(share > 10, "converged after {share} % of the ticks");
     }
 }
 
 #[test]
-fn overtaken_frames_are_ignored_and_the_map_still_comes() {
+fn reordered_frames_are_ignored_and_the_replica_converges() {
     let mut random = Random(60);
     let mut robot = Robot::<V>::new(1);
     let mut listener = Listener::<V>::new();
@@ -320,31 +325,31 @@ fn overtaken_frames_are_ignored_and_the_map_still_comes() {
             let first = random.below(frames.len() - 1);
             frames.swap(first, first + 1);
         }
-        frames.iter().for_each(|frame| listener.hear(frame));
+        frames.iter().for_each(|frame| listener.decode(frame));
         for _ in 0..robot.filter.map.vertices().len() + 4 {
-            robot.tick(&mut random).iter().for_each(|frame| listener.hear(frame));
+            robot.tick(&mut random).iter().for_each(|frame| listener.decode(frame));
         }
         assert!(listener.replica.is_converged() && same(&listener.replica, &robot.filter.map));
     }
 }
 
 #[test]
-fn a_robot_that_starts_anew_begins_with_an_empty_map() {
+fn a_restarted_robot_clears_the_replica() {
     let mut random = Random(61);
     let mut listener = Listener::<V>::new();
     let mut robot = Robot::<V>::new(1);
     robot.change_hypothesis(&mut random);
-    robot.tick(&mut random).iter().for_each(|frame| listener.hear(frame));
-    robot.place(&mut random).iter().for_each(|frame| listener.hear(frame));
+    robot.tick(&mut random).iter().for_each(|frame| listener.decode(frame));
+    robot.place(&mut random).iter().for_each(|frame| listener.decode(frame));
     assert!(listener.replica.is_converged());
     let mut robot = Robot::<V>::new(2);
-    robot.tick(&mut random).iter().for_each(|frame| listener.hear(frame));
+    robot.tick(&mut random).iter().for_each(|frame| listener.decode(frame));
     assert_eq!((listener.replica.vertices(), listener.replica.location()), (0, None));
     assert!(listener.replica.is_converged());
 }
 
 #[test]
-fn a_map_of_64_vertices_arrives_whole() {
+fn a_map_of_64_vertices_converges() {
     let mut random = Random(62);
     let mut robot = Robot::<64>::new(1);
     while robot.filter.map.vertices().len() < 64 {
@@ -355,12 +360,12 @@ fn a_map_of_64_vertices_arrives_whole() {
         robot.filter.map.add_edge(a, b);
     }
     let mut listener = Listener::<64>::new();
-    robot.place(&mut random).iter().for_each(|frame| listener.hear(frame));
+    robot.place(&mut random).iter().for_each(|frame| listener.decode(frame));
     assert!(listener.replica.is_converged() && same(&listener.replica, &robot.filter.map));
 }
 
 #[test]
-fn the_whole_map_is_sent_in_a_quarter_of_the_ticks_and_then_at_the_usual_pace() {
+fn a_full_send_takes_a_quarter_of_the_ticks_and_then_the_usual_pace_resumes() {
     let mut random = Random(11);
     let mut robot = Robot::<V>::new(1);
     while robot.filter.map.vertices().len() < 14 {
@@ -372,9 +377,9 @@ fn the_whole_map_is_sent_in_a_quarter_of_the_ticks_and_then_at_the_usual_pace() 
     robot.reporter.send_full();
     let lengths: Vec<usize> = (0..7).map(|_| robot.tick(&mut random).len()).collect();
     assert_eq!(usual, 1);
-    // An introduction, 14 rows, the size, the location, the belief, and no fault.
+    // A `Hello`, 14 rows, the size, the location, the belief, and no fault.
     assert_eq!(lengths, [5, 4, 4, 4, 1, 1, 1]);
-    // A queue that is full holds the rest of the round back.
+    // A full queue delays the rest of the round.
     robot.reporter.send_full();
     let mut sent = 0;
     let mut calls = 0;

@@ -1,7 +1,7 @@
 //! Streams that are split, cut, corrupted or mixed with foreign bytes, at every offset.
 
 use super::samples::{largest, typical};
-use super::{Heard, frame, hear};
+use super::{Decoded, decode, frame};
 use proptest::prelude::*;
 use toposlam::wire::{Decoder, Encoder, FRAME_VERSION, MAX_FRAME_BYTES, Message};
 
@@ -18,63 +18,68 @@ fn stream() -> (Vec<Message>, Vec<u8>, Vec<usize>) {
     (messages, bytes, ends)
 }
 
-/// The messages heard must be the ones sent but for those in `missing`, each under its own number.
-fn assert_only_missing(sent: &[Message], heard: &Heard, missing: std::ops::RangeInclusive<usize>, what: &str) {
-    let numbered: Vec<_> = heard.messages.iter().map(|(header, message)| (header.sequence.into(), *message)).collect();
+/// Asserts that all sent messages but those in `missing` were decoded, each with its own sequence number.
+fn assert_only_missing(sent: &[Message], decoded: &Decoded, missing: std::ops::RangeInclusive<usize>, what: &str) {
+    let numbered: Vec<_> =
+        decoded.messages.iter().map(|(header, message)| (header.sequence.into(), *message)).collect();
     let expected: Vec<_> = sent.iter().copied().enumerate().filter(|(number, _)| !missing.contains(number)).collect();
     assert_eq!(numbered, expected, "{what}");
 }
 
 #[test]
-fn it_does_not_matter_where_the_stream_is_split() {
+fn decoding_is_independent_of_the_split_points() {
     let (messages, bytes, _) = stream();
     for split in 0..=bytes.len() {
         let mut decoder = Decoder::new();
-        let mut heard = Heard::default();
-        heard.hear(&mut decoder, &bytes[..split]);
-        heard.hear(&mut decoder, &bytes[split..]);
-        assert_eq!(heard.messages.len(), messages.len());
-        assert_eq!(heard, hear(&bytes), "split at {split}");
+        let mut decoded = Decoded::default();
+        decoded.decode(&mut decoder, &bytes[..split]);
+        decoded.decode(&mut decoder, &bytes[split..]);
+        assert_eq!(decoded.messages.len(), messages.len());
+        assert_eq!(decoded, decode(&bytes), "split at {split}");
     }
     let mut decoder = Decoder::new();
-    let mut heard = Heard::default();
+    let mut decoded = Decoded::default();
     for byte in &bytes {
-        heard.hear(&mut decoder, std::slice::from_ref(byte));
+        decoded.decode(&mut decoder, std::slice::from_ref(byte));
     }
-    assert_eq!(heard, hear(&bytes), "byte by byte");
+    assert_eq!(decoded, decode(&bytes), "byte by byte");
 }
 
 #[test]
 fn a_listener_can_join_at_any_byte() {
     let (messages, bytes, ends) = stream();
     for start in 0..bytes.len() {
-        let heard = hear(&bytes[start..]);
+        let decoded = decode(&bytes[start..]);
         let touched = ends.iter().filter(|&&end| end <= start).count();
         let whole = start == 0 || ends.contains(&start);
-        // A frame that lacks nothing but its closing zero was the one before; the zero alone is no frame.
+        // If only the closing zero of a frame is left, it is not an error: a zero alone is not a frame.
         let cut_errors = usize::from(!whole && !ends.contains(&(start + 1)));
         let first = if whole { touched } else { touched + 1 };
-        assert_eq!(heard.messages.len(), messages.len() - first, "joined at {start}");
-        assert_eq!(heard.messages.first().map(|heard| heard.1), messages.get(first).copied(), "joined at {start}");
-        assert_eq!(heard.errors, cut_errors, "joined at {start}");
+        assert_eq!(decoded.messages.len(), messages.len() - first, "joined at {start}");
+        assert_eq!(
+            decoded.messages.first().map(|decoded| decoded.1),
+            messages.get(first).copied(),
+            "joined at {start}"
+        );
+        assert_eq!(decoded.errors, cut_errors, "joined at {start}");
     }
 }
 
 #[test]
-fn a_lost_byte_costs_one_frame_or_two_and_no_message_is_wrong() {
+fn a_lost_byte_invalidates_at_most_two_frames() {
     let (messages, bytes, ends) = stream();
     for gone in 0..bytes.len() {
         let mut damaged = bytes.clone();
         damaged.remove(gone);
         let touched = ends.iter().filter(|&&end| end <= gone).count();
-        // Without its zero a frame runs into the next one.
+        // Without its closing zero, a frame merges with the next one.
         let last = touched + usize::from(bytes[gone] == 0);
-        assert_only_missing(&messages, &hear(&damaged), touched..=last, &format!("without byte {gone}"));
+        assert_only_missing(&messages, &decode(&damaged), touched..=last, &format!("without byte {gone}"));
     }
 }
 
 #[test]
-fn any_other_byte_in_any_place_costs_one_frame_or_two_and_no_message_is_wrong() {
+fn a_changed_byte_invalidates_at_most_two_frames() {
     let edge = Message::Edge { a: 1, b: 2, present: true };
     for message in typical().into_iter().chain(largest()) {
         let mut encoder = Encoder::new(0);
@@ -84,15 +89,15 @@ fn any_other_byte_in_any_place_costs_one_frame_or_two_and_no_message_is_wrong() 
             for flip in 1..=255 {
                 let mut damaged = frame.clone();
                 damaged[place] ^= flip;
-                let heard = hear(&[&before[..], &damaged, &after].concat());
-                assert_only_missing(&[edge, message, edge], &heard, 1..=last, &format!("byte {place} ^ {flip}"));
+                let decoded = decode(&[&before[..], &damaged, &after].concat());
+                assert_only_missing(&[edge, message, edge], &decoded, 1..=last, &format!("byte {place} ^ {flip}"));
             }
         }
     }
 }
 
 #[test]
-fn foreign_bytes_anywhere_cost_at_most_one_frame_and_no_message_is_wrong() {
+fn foreign_bytes_invalidate_at_most_one_frame() {
     let (messages, bytes, ends) = stream();
     let foreign: [&[u8]; 7] =
         [&[0], &[0, 0, 0], &[1], &[0xFF], b"panicked at src/main.rs\r\n", &[5, 0, 7, 0], &[0xA5; 3 * MAX_FRAME_BYTES]];
@@ -100,25 +105,25 @@ fn foreign_bytes_anywhere_cost_at_most_one_frame_and_no_message_is_wrong() {
         for foreign in foreign {
             let mut damaged = bytes.clone();
             damaged.splice(place..place, foreign.iter().copied());
-            let heard = hear(&damaged);
+            let decoded = decode(&damaged);
             let touched = ends.iter().filter(|&&end| end <= place).count();
             let between_frames = place == 0 || ends.contains(&place);
             let closed = between_frames && foreign.ends_with(&[0]);
-            // Foreign bytes that happen to be the rest of the frame complete it.
+            // Foreign bytes that equal the rest of the frame complete it.
             let rest = ends.get(touched).and_then(|&end| bytes.get(place..end));
             let completed = rest.is_some_and(|rest| foreign.starts_with(rest));
             let what = format!("{foreign:?} at {place}");
             if place == bytes.len() || closed || completed {
-                assert_eq!(heard.messages.len(), messages.len(), "{what}");
+                assert_eq!(decoded.messages.len(), messages.len(), "{what}");
             } else {
-                assert_only_missing(&messages, &heard, touched..=touched, &what);
+                assert_only_missing(&messages, &decoded, touched..=touched, &what);
             }
         }
     }
 }
 
 #[test]
-fn every_kind_of_damage_is_counted_as_what_it_is() {
+fn every_kind_of_damage_has_its_counter() {
     let edge = Message::Edge { a: 1, b: 2, present: true };
     let good = frame(&mut Encoder::new(0), &edge);
     let mut corrupt = good.clone();
@@ -128,7 +133,7 @@ fn every_kind_of_damage_is_counted_as_what_it_is() {
     let mut too_long = vec![0xAA; 2000];
     too_long.push(0);
     let mut decoder = Decoder::new();
-    let mut heard = Heard::default();
+    let mut decoded = Decoded::default();
     for bytes in [
         &corrupt,
         &cut,
@@ -137,35 +142,35 @@ fn every_kind_of_damage_is_counted_as_what_it_is() {
         &with_crc(&[FRAME_VERSION, 0, 0, 0x7F]),
         &good,
     ] {
-        heard.hear(&mut decoder, bytes);
+        decoded.decode(&mut decoder, bytes);
     }
     let trailing = with_crc(&[FRAME_VERSION, 1, 0, 4, 1, 2, 1, 9]);
-    heard.hear(&mut decoder, &trailing);
-    heard.hear(&mut decoder, &frame(&mut Encoder::new(2), &edge));
+    decoded.decode(&mut decoder, &trailing);
+    decoded.decode(&mut decoder, &frame(&mut Encoder::new(2), &edge));
     let counters = decoder.counters();
     assert_eq!((counters.corrupt, counters.cut, counters.too_long), (1, 1, 1));
     assert_eq!((counters.unknown_version, counters.unknown_message), (1, 2));
-    assert_eq!((counters.messages, counters.lost), (2, 0), "an unknown message is not a lost one");
-    assert_eq!((heard.messages.len(), heard.errors), (2, 6));
+    assert_eq!((counters.messages, counters.lost), (2, 0), "an unknown message is not lost");
+    assert_eq!((decoded.messages.len(), decoded.errors), (2, 6));
 }
 
 proptest! {
     #[test]
-    fn noise_is_no_message_and_the_frame_after_it_is_heard(noise in proptest::collection::vec(any::<u8>(), 0..600)) {
+    fn noise_is_skipped_and_the_next_frame_is_decoded(noise in proptest::collection::vec(any::<u8>(), 0..600)) {
         let edge = Message::Edge { a: 1, b: 2, present: true };
         let stream = [&noise[..], &[0], &frame(&mut Encoder::new(0), &edge)].concat();
-        let messages: Vec<_> = hear(&stream).messages.into_iter().map(|(_, message)| message).collect();
+        let messages: Vec<_> = decode(&stream).messages.into_iter().map(|(_, message)| message).collect();
         prop_assert_eq!(messages, [edge]);
     }
 
     #[test]
     fn an_intact_frame_of_any_payload_is_one_message_or_one_error(payload in proptest::collection::vec(any::<u8>(), 0..103)) {
-        let heard = hear(&with_crc(&[&[FRAME_VERSION, 0, 0], &payload[..]].concat()));
-        prop_assert_eq!(heard.messages.len() + heard.errors, 1);
+        let decoded = decode(&with_crc(&[&[FRAME_VERSION, 0, 0], &payload[..]].concat()));
+        prop_assert_eq!(decoded.messages.len() + decoded.errors, 1);
     }
 }
 
-/// A frame of the given header and payload, by another CRC and COBS than the library's.
+/// A frame with the given header and payload, by a CRC and COBS independent of the library.
 pub(crate) fn with_crc(body: &[u8]) -> Vec<u8> {
     let mut crc = u32::MAX;
     for byte in body {

@@ -1,7 +1,8 @@
-//! One file of examples for whoever writes another decoder, `host-tests/golden/stream.jsonl`: every kind of message and request, and
-//! damaged streams, each with what this library makes of it. `docs/stream.md` says what its lines hold.
+//! The golden file for other decoders, `host-tests/golden/stream.jsonl`: every kind of message and request, and damaged
+//! streams, each with the result of this library. `docs/stream.md` describes its lines.
 //!
-//! `WRITE_GOLDEN=1 cargo test -p toposlam-host-tests --test wire golden` writes it, without that it is compared.
+//! `WRITE_GOLDEN=1 cargo test -p toposlam-host-tests --test wire golden` writes it; without the variable the test
+//! compares it.
 
 use std::path::Path;
 
@@ -16,29 +17,29 @@ use toposlam_sim::world::{Plan, RobotModel};
 
 use super::samples::{extreme_requests, extremes, largest, largest_requests, requests, typical};
 use super::streams::{Draw, damage, every_damage, foreign_payloads, long_lists, lossy, renamed, restarted, wrapping};
-use super::{frame, hear};
+use super::{decode, frame};
 
 const FILE: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/golden/stream.jsonl");
 const EXPLORATION: &str = "an exploration";
 
 #[test]
-fn the_golden_file_says_what_this_library_makes_of_every_frame_and_stream() {
+fn the_golden_file_matches_the_library() {
     let stored = std::fs::read_to_string(FILE).unwrap_or_default();
     let write = std::env::var_os("WRITE_GOLDEN").is_some();
-    // The exploration itself is not compared: it changes with the drive and the filter, and the protocol does not.
+    // The exploration itself is not compared: it depends on the drive and the filter, not on the protocol.
     let exploration = if write { explore() } else { stored_exploration(&stored) };
     let records = records(&exploration);
     let text: String = records.iter().map(|record| format!("{record}\n")).collect();
-    assert_the_streams_show_everything(&records);
+    assert_streams_cover_everything(&records);
     if write {
         std::fs::create_dir_all(Path::new(FILE).parent().unwrap()).unwrap();
         std::fs::write(FILE, text).unwrap();
         return;
     }
     for (number, (wanted, found)) in text.lines().zip(stored.lines()).enumerate() {
-        assert_eq!(wanted, found, "line {} of {FILE}; WRITE_GOLDEN=1 writes it anew", number + 1);
+        assert_eq!(wanted, found, "line {} of {FILE} differs; WRITE_GOLDEN=1 updates it", number + 1);
     }
-    assert_eq!(text.lines().count(), stored.lines().count(), "{FILE}; WRITE_GOLDEN=1 writes it anew");
+    assert_eq!(text.lines().count(), stored.lines().count(), "{FILE} has another length; WRITE_GOLDEN=1 updates it");
 }
 
 /// The lines of the file.
@@ -80,8 +81,8 @@ fn records(exploration: &[Vec<u8>]) -> Vec<Value> {
     records
 }
 
-/// A file in which something never happens would test nothing of it.
-fn assert_the_streams_show_everything(records: &[Value]) {
+/// Asserts that the streams cover every counter and a converged replica.
+fn assert_streams_cover_everything(records: &[Value]) {
     let streams: Vec<&Value> = records.iter().filter(|record| record["kind"] == "stream").collect();
     for counter in ["lost", "corrupt", "cut", "too_long", "unknown_version", "unknown_message"] {
         assert!(streams.iter().filter(|stream| stream["counters"][counter] != 0).count() > 1, "no {counter}");
@@ -94,9 +95,9 @@ fn assert_the_streams_show_everything(records: &[Value]) {
 /// A message and its frame.
 fn sent(message: &Message, sequence: u16) -> Value {
     let bytes = frame(&mut Encoder::new(sequence), message);
-    let heard = hear(&bytes);
-    let [(header, heard)] = heard.messages[..] else { panic!("{message:?} is heard as {heard:?}") };
-    json!({"kind": "message", "frame": hex(&bytes), "event": json::event(Event::Message(header, &heard))})
+    let decoded = decode(&bytes);
+    let [(header, decoded)] = decoded.messages[..] else { panic!("{message:?} is decoded as {decoded:?}") };
+    json!({"kind": "message", "frame": hex(&bytes), "event": json::event(Event::Message(header, &decoded))})
 }
 
 /// A request and its frame.
@@ -105,7 +106,7 @@ fn asked((request, sequence): (Request, u16)) -> Value {
     json!({"kind": "request", "frame": hex(&bytes), "sequence": sequence, "request": serde_json::to_value(request).unwrap()})
 }
 
-/// A stream, and all that a listener makes of it.
+/// A stream, and the listener's events, counters and replica.
 fn stream(name: &str, bytes: &[u8]) -> Value {
     let mut listener = Listener::new();
     let (mut events, mut converged, mut lines) = (0, 0, String::new());
@@ -149,7 +150,7 @@ fn replica_json(replica: &MapReplica<64>) -> Value {
     })
 }
 
-/// The frames of a simulated robot's first places, without most of what it says between them, numbered without gaps.
+/// The frames of a simulated robot's first places, without most messages between them, numbered without gaps.
 fn explore() -> Vec<Vec<u8>> {
     let mut buffer = [0; SNAPSHOT_BYTES];
     let plan = Plan::built_in("office").unwrap();
@@ -164,9 +165,9 @@ fn explore() -> Vec<Vec<u8>> {
         exploration.drive(velocity);
         let turn = exploration.frames();
         let mut messages: Vec<Message> =
-            hear(&exploration.board().sent).messages.into_iter().map(|(_, message)| message).collect();
+            decode(&exploration.board().sent).messages.into_iter().map(|(_, message)| message).collect();
         if turn % 400 == 0 {
-            // No board sends them; some may.
+            // Boards may send ring frames; the simulated robot does not.
             messages.push(Message::Ring { frame_index: turn as u32, echoes: Echoes::new(&ring.echoes) });
         }
         for message in messages {
@@ -183,13 +184,13 @@ fn explore() -> Vec<Vec<u8>> {
     frames
 }
 
-/// The frames of the exploration that the file holds.
+/// The frames of the exploration in the golden file.
 fn stored_exploration(stored: &str) -> Vec<Vec<u8>> {
     let records = stored.lines().map(|line| serde_json::from_str::<Value>(line).unwrap());
     let bytes = records
         .filter(|record| record["name"] == EXPLORATION)
         .find_map(|record| Some(bytes(record["bytes"].as_str()?)))
-        .unwrap_or_else(|| panic!("{FILE} holds no exploration; WRITE_GOLDEN=1 writes it"));
+        .unwrap_or_else(|| panic!("{FILE} has no exploration; WRITE_GOLDEN=1 writes it"));
     bytes.split_inclusive(|&byte| byte == 0).map(<[u8]>::to_vec).collect()
 }
 

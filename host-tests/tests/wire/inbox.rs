@@ -1,4 +1,4 @@
-//! The robot's end of the line: requests that are cut and changed at every byte, and floods that must not touch the mapping.
+//! The robot's inbox: requests truncated and corrupted at every byte, and floods that must not affect the mapping.
 
 use super::console::{FakeRobot, TURNS};
 use super::damage::with_crc;
@@ -9,10 +9,10 @@ use proptest::prelude::*;
 use toposlam::FaultKind;
 use toposlam::wire::{Command, Encoder, Inbox, Message, Outcome, Payload, Refusal, Reply, Request, map_digest};
 
-/// What a line of 115,200 baud brings in a ring frame of 130 ms.
+/// The bytes of a line of 115,200 baud per ring frame of 130 ms.
 const LINE_BYTES_PER_TURN: usize = 1500;
 
-/// What an inbox executes of some bytes, one turn after each zero.
+/// The commands that an inbox executes, with one turn after each zero byte.
 fn executed(inbox: &mut Inbox, bytes: &[u8]) -> Vec<Command> {
     let mut executed = Vec::new();
     for &byte in bytes {
@@ -30,7 +30,7 @@ fn executed(inbox: &mut Inbox, bytes: &[u8]) -> Vec<Command> {
 const AFTER: Request = Request { id: 9, command: Command::Pause { on: false } };
 
 #[test]
-fn a_request_that_is_cut_anywhere_is_not_executed_and_the_next_one_is() {
+fn a_truncated_request_is_not_executed_and_the_next_one_is() {
     for request in [requests(), largest_requests()].concat() {
         let whole = frame(&mut Encoder::new(0), &request);
         let after = frame(&mut Encoder::new(1), &AFTER);
@@ -47,7 +47,7 @@ fn a_request_that_is_cut_anywhere_is_not_executed_and_the_next_one_is() {
 }
 
 #[test]
-fn a_request_with_any_byte_changed_is_not_executed_and_the_next_one_is() {
+fn a_corrupt_request_is_not_executed_and_the_next_one_is() {
     for request in [requests(), largest_requests()].concat() {
         let whole = frame(&mut Encoder::new(0), &request);
         let after = frame(&mut Encoder::new(1), &AFTER);
@@ -56,7 +56,7 @@ fn a_request_with_any_byte_changed_is_not_executed_and_the_next_one_is() {
                 let mut damaged = whole.clone();
                 damaged[place] ^= flip;
                 let heard = executed(&mut Inbox::new(), &[&damaged[..], &[0], &after].concat());
-                // Without its closing zero the frame is closed by the next one, with a byte too many.
+                // Without its closing zero, the frame ends at the zero of the next one, with one byte too many.
                 assert_eq!(heard, [AFTER.command], "{request:?}, byte {place} ^ {flip}");
             }
         }
@@ -64,7 +64,7 @@ fn a_request_with_any_byte_changed_is_not_executed_and_the_next_one_is() {
 }
 
 #[test]
-fn a_line_that_echoes_what_the_robot_says_gives_no_commands() {
+fn echoed_robot_messages_are_not_commands() {
     let mut inbox = Inbox::new();
     let messages = [typical(), largest()].concat();
     for (number, message) in (1..).zip(&messages) {
@@ -83,7 +83,7 @@ proptest! {
 }
 
 #[test]
-fn a_turn_looks_at_a_bounded_number_of_bytes_and_executes_one_request() {
+fn a_turn_decodes_a_bounded_number_of_bytes_and_executes_one_request() {
     let mut inbox = Inbox::new();
     let mut encoder = Encoder::new(0);
     let flood: Vec<u8> =
@@ -99,15 +99,15 @@ fn a_turn_looks_at_a_bounded_number_of_bytes_and_executes_one_request() {
         assert!(executions <= 1 && reply.is_some());
         let looked_at = usize::from(Inbox::BYTES_PER_TURN) / per_frame + 1;
         let faults = inbox.faults().count(FaultKind::CommandFlood) + inbox.faults().count(FaultKind::WireCorrupt);
-        assert!(faults as usize <= turn * (looked_at + 1), "{faults} faults: the rest was not looked at");
+        assert!(faults as usize <= turn * (looked_at + 1), "{faults} faults: the rest was dropped undecoded");
         assert!(inbox.faults().count(FaultKind::CommandFlood) > 0);
     }
-    assert_eq!(inbox.turn(|_| unreachable!("nothing waits")), None);
+    assert_eq!(inbox.turn(|_| unreachable!("no request waits")), None);
     assert_eq!(executed(&mut inbox, &[&[0][..], &frame(&mut encoder, &AFTER)].concat()), [AFTER.command]);
 }
 
 #[test]
-fn a_second_request_in_a_turn_is_dropped_and_the_same_one_again_is_not_a_second() {
+fn a_second_request_in_a_turn_is_dropped_and_a_repeated_one_is_not() {
     let mut inbox = Inbox::new();
     let first = Request { id: 1, command: Command::Info };
     for request in [first, first, Request { id: 2, command: Command::Info }] {
@@ -119,14 +119,18 @@ fn a_second_request_in_a_turn_is_dropped_and_the_same_one_again_is_not_a_second(
     assert_eq!(reply(&mut inbox), expected);
     assert_eq!(reply(&mut inbox), None);
     frame(&mut Encoder::new(0), &first).iter().for_each(|&byte| inbox.take(byte));
-    assert_eq!(inbox.turn(|_| unreachable!("it was executed")), expected, "the same reply again");
-    assert_eq!(inbox.faults().count(FaultKind::CommandRefused), 1, "it was refused once");
-    // The same number with another command is another request.
+    assert_eq!(
+        inbox.turn(|_| unreachable!("a repeated request is not executed again")),
+        expected,
+        "a repeated request gets the same reply"
+    );
+    assert_eq!(inbox.faults().count(FaultKind::CommandRefused), 1, "the refusal is counted once");
+    // The same id with another command is another request.
     frame(&mut Encoder::new(0), &Request { id: 1, ..AFTER }).iter().for_each(|&byte| inbox.take(byte));
     assert_eq!(inbox.turn(|_| Outcome::Done), Some(Reply { request: 1, outcome: Outcome::Done }));
 }
 
-/// What a flood brings in each turn.
+/// The bytes of a flood in each turn.
 type Flood = Box<dyn FnMut(usize) -> Vec<u8>>;
 
 fn floods() -> Vec<(&'static str, FaultKind, Flood)> {
@@ -159,18 +163,18 @@ fn floods() -> Vec<(&'static str, FaultKind, Flood)> {
     ]
 }
 
-/// What was said of the map and the places.
-fn of_the_map(said: &[Message]) -> Vec<Message> {
+/// The messages about the map and the places.
+fn map_messages(said: &[Message]) -> Vec<Message> {
     said.iter().filter(|message| !matches!(message, Message::Fault { .. } | Message::Reply(_))).copied().collect()
 }
 
 #[test]
-fn a_flood_at_the_full_rate_of_the_line_leaves_the_mapping_bit_for_bit_as_it_is() {
+fn a_flood_at_the_full_line_rate_does_not_change_the_mapping() {
     let mut calm = FakeRobot::new();
     for _ in 0..TURNS {
         calm.turn(&[]);
     }
-    let (mapping, said) = (calm.mapping(), of_the_map(&calm.said));
+    let (mapping, said) = (calm.mapping(), map_messages(&calm.said));
     assert!(calm.mapper.map().vertices().len() > 4);
     for (what, kind, mut flood) in floods() {
         let mut robot = FakeRobot::new();
@@ -180,10 +184,10 @@ fn a_flood_at_the_full_rate_of_the_line_leaves_the_mapping_bit_for_bit_as_it_is(
         assert!(robot.inbox.faults().count(kind) > 0, "{what}: {:?}", robot.inbox.faults());
         assert!(robot.mapping() == mapping, "{what}");
         assert_eq!(map_digest(robot.mapper.map()), map_digest(calm.mapper.map()), "{what}");
-        assert!(of_the_map(&robot.said) == said, "{what}");
-        // The counts go out, and the next request is answered.
+        assert!(map_messages(&robot.said) == said, "{what}");
+        // The counts are sent, and the next request is answered.
         let told = Message::Fault { kind: kind as u8, count: robot.inbox.faults().count(kind) };
-        assert!(robot.said.iter().rev().take(40).any(|message| *message == told), "{what}: the last count is told");
+        assert!(robot.said.iter().rev().take(40).any(|message| *message == told), "{what}: the last count is sent");
         robot.turn(&[]);
         robot.turn(&[&[0][..], &frame(&mut Encoder::new(0), &AFTER)].concat());
         let answered = Message::Reply(Reply { request: AFTER.id, outcome: Outcome::Done });

@@ -18,9 +18,9 @@ use samples::{largest, typical};
 use toposlam::VertexId;
 use toposlam::wire::{Arrival, Decoder, Encoder, Header, MAX_FRAME_BYTES, Message, Payload, Progress};
 
-/// The vertex with a number.
+/// The vertex with an id.
 fn vertex(number: usize) -> VertexId {
-    VertexId::new(number as u8).expect("tests number vertices from 0 to 63")
+    VertexId::new(number as u8).expect("the tests use ids from 0 to 63")
 }
 
 /// The frame of a message or a request.
@@ -28,15 +28,15 @@ fn frame(encoder: &mut Encoder, message: &impl Payload) -> Vec<u8> {
     encoder.encode(message, &mut [0; MAX_FRAME_BYTES]).expect("every message fits the largest frame").to_vec()
 }
 
-/// All that a decoder makes of some bytes.
+/// The messages and errors of a decoder.
 #[derive(Debug, Default, PartialEq)]
-struct Heard {
+struct Decoded {
     messages: Vec<(Header, Message)>,
     errors: usize,
 }
 
-impl Heard {
-    fn hear(&mut self, decoder: &mut Decoder, mut bytes: &[u8]) {
+impl Decoded {
+    fn decode(&mut self, decoder: &mut Decoder, mut bytes: &[u8]) {
         loop {
             match decoder.feed(bytes) {
                 Progress::NeedsMore => return,
@@ -55,18 +55,18 @@ impl Heard {
     }
 }
 
-fn hear(bytes: &[u8]) -> Heard {
-    let mut heard = Heard::default();
-    heard.hear(&mut Decoder::new(), bytes);
-    heard
+fn decode(bytes: &[u8]) -> Decoded {
+    let mut decoded = Decoded::default();
+    decoded.decode(&mut Decoder::new(), bytes);
+    decoded
 }
 
 #[test]
-fn every_message_comes_back_as_it_went_out() {
+fn every_message_round_trips() {
     for message in typical().into_iter().chain(largest()) {
-        let heard = hear(&frame(&mut Encoder::new(300), &message));
-        assert_eq!(heard.messages, [(Header { sequence: 300, arrival: Arrival::First }, message)]);
-        assert_eq!(heard.errors, 0);
+        let decoded = decode(&frame(&mut Encoder::new(300), &message));
+        assert_eq!(decoded.messages, [(Header { sequence: 300, arrival: Arrival::First }, message)]);
+        assert_eq!(decoded.errors, 0);
     }
 }
 
@@ -88,25 +88,25 @@ fn a_frame_holds_one_zero_and_it_is_the_last_byte() {
 fn the_sequence_wraps_without_a_gap() {
     let mut encoder = Encoder::new(0xFFFE);
     let mut decoder = Decoder::new();
-    let mut heard = Heard::default();
+    let mut decoded = Decoded::default();
     for message in typical().iter().take(4) {
-        heard.hear(&mut decoder, &frame(&mut encoder, message));
+        decoded.decode(&mut decoder, &frame(&mut encoder, message));
     }
-    let headers: Vec<_> = heard.messages.iter().map(|(header, _)| (header.sequence, header.arrival)).collect();
+    let headers: Vec<_> = decoded.messages.iter().map(|(header, _)| (header.sequence, header.arrival)).collect();
     let expected = [(0xFFFE, Arrival::First), (0xFFFF, Arrival::InOrder), (0, Arrival::InOrder), (1, Arrival::InOrder)];
     assert_eq!(headers, expected);
     assert_eq!(decoder.counters().lost, 0);
 }
 
 #[test]
-fn lost_repeated_and_restarted_frames_are_told_apart() {
+fn lost_repeated_and_restarted_frames_are_distinguished() {
     let edge = Message::Edge { a: 0, b: 1, present: true };
     let Message::Hello(mut hello) = typical()[0] else { panic!("the first sample is a Hello") };
     let mut decoder = Decoder::new();
     let mut arrival = |sequence, message: Message| {
-        let mut heard = Heard::default();
-        heard.hear(&mut decoder, &frame(&mut Encoder::new(sequence), &message));
-        heard.messages[0].0.arrival
+        let mut decoded = Decoded::default();
+        decoded.decode(&mut decoder, &frame(&mut Encoder::new(sequence), &message));
+        decoded.messages[0].0.arrival
     };
     assert_eq!(arrival(65530, Message::Hello(hello)), Arrival::First);
     assert_eq!(arrival(65533, edge), Arrival::AfterGap { lost: 2 });
@@ -122,11 +122,11 @@ fn lost_repeated_and_restarted_frames_are_told_apart() {
 }
 
 #[test]
-fn a_hello_with_other_messages_under_the_same_version_is_refused() {
+fn a_hello_with_another_schema_under_the_same_version_is_refused() {
     let Message::Hello(mut hello) = typical()[0] else { panic!("the first sample is a Hello") };
     assert_eq!(hello.check(), Ok(()));
     hello.schema_hash ^= 1;
     assert!(hello.check().is_err());
     hello.protocol_version += 1;
-    assert_eq!(hello.check(), Ok(()), "a newer robot's known messages are understood");
+    assert_eq!(hello.check(), Ok(()), "a robot with a newer protocol version is accepted");
 }

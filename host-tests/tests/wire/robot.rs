@@ -1,4 +1,4 @@
-//! A robot whose map changes at random, and what it sends.
+//! A robot whose map changes at random, and its messages.
 
 use super::{frame, vertex};
 use toposlam::wire::{Capacities, Encoder, Hello, Message, QueueFull, Reporter, ResetCause};
@@ -26,11 +26,11 @@ impl Random {
     }
 }
 
-/// A filter that believes what it is told to.
+/// A filter whose state the tests set.
 #[derive(Clone)]
 pub(crate) struct Believer<const V: usize> {
     pub(crate) map: Map<V>,
-    /// The number of each vertex of the map before, now.
+    /// For each vertex id before the update, the id after it.
     pub(crate) names: Vec<Option<VertexId>>,
     pub(crate) location: VertexId,
     pub(crate) worst: WorstNgram,
@@ -131,7 +131,7 @@ impl<const V: usize> Robot<V> {
         }
     }
 
-    /// The map changes as it does from place to place: a new vertex or a known one, one new edge, one more visit.
+    /// Changes the map as one place does: a new or known vertex, one new edge, one more visit.
     pub(crate) fn drive(&mut self, random: &mut Random) {
         let Believer { map, location, names, .. } = &mut self.filter;
         names.clear();
@@ -147,11 +147,11 @@ impl<const V: usize> Robot<V> {
         if known > 0 {
             map.add_edge(from, *location);
         }
-        self.name_a_worst(random);
+        self.set_random_worst(random);
     }
 
-    /// Another hypothesis becomes the best one: a map of another size with other labels and edges, whose vertices have
-    /// nothing to do with those before.
+    /// Makes another hypothesis the best one: a map of another size with other labels and edges, whose vertices are
+    /// unrelated to the previous ones.
     pub(crate) fn change_hypothesis(&mut self, random: &mut Random) {
         let Believer { map, location, names, .. } = &mut self.filter;
         names.clear();
@@ -164,16 +164,15 @@ impl<const V: usize> Robot<V> {
             map.add_edge(random.vertex(vertices), random.vertex(vertices));
         }
         *location = random.vertex(vertices);
-        self.name_a_worst(random);
+        self.set_random_worst(random);
     }
 
-    /// The map is repaired: its vertices get other numbers, some are merged, some are gone, some are new, and an edge is
-    /// drawn or forgotten.
+    /// Repairs the map: vertices are reordered, merged, removed and added, and an edge is added or removed.
     pub(crate) fn repair(&mut self, random: &mut Random) {
         let Believer { map, location, names, .. } = &mut self.filter;
         let before = *map;
         let old = before.vertices();
-        // Where each vertex of the new map comes from, in random order.
+        // The origin of each vertex of the new map, in random order.
         let mut origins: Vec<Option<VertexId>> = old.clone().filter(|_| !random.happens(15)).map(Some).collect();
         if origins.len() < V && random.happens(50) || origins.is_empty() {
             origins.push(None);
@@ -203,10 +202,10 @@ impl<const V: usize> Robot<V> {
         let vertices = map.vertices().len();
         map.add_edge(random.vertex(vertices), random.vertex(vertices));
         *location = names.get(location.index()).copied().flatten().unwrap_or(VertexId::FIRST);
-        self.name_a_worst(random);
+        self.set_random_worst(random);
     }
 
-    /// One of the three things that happen to a map.
+    /// Applies one of the three kinds of map change.
     pub(crate) fn change(&mut self, random: &mut Random) {
         match random.below(10) {
             0 | 1 => self.change_hypothesis(random),
@@ -215,7 +214,7 @@ impl<const V: usize> Robot<V> {
         }
     }
 
-    fn name_a_worst(&mut self, random: &mut Random) {
+    fn set_random_worst(&mut self, random: &mut Random) {
         let vertices = self.filter.map.vertices().len();
         let walk = std::array::from_fn(|_| random.vertex(vertices));
         let length = random.below(8) as u8;

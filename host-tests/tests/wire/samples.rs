@@ -1,4 +1,4 @@
-//! One typical and one largest message and request of every kind, and what lies at other ends.
+//! A typical, a largest and an extreme message and request of every kind.
 
 use toposlam::Fingerprint;
 use toposlam::ring::Echo;
@@ -234,7 +234,7 @@ fn largest_reply(outcome: Outcome) -> Message {
     Message::Reply(Reply { request: u16::MAX, outcome })
 }
 
-/// The least of every number, no element of any list, the other end of what is signed, and every kind that is one byte.
+/// Empty lists, the minimum of unsigned numbers, the other extreme of signed ones, and every one-byte enum variant.
 pub(crate) fn extremes() -> Vec<Message> {
     let reply = |outcome| Message::Reply(Reply { request: 0, outcome });
     let evidence = |place_index, logarithm| {

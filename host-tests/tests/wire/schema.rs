@@ -16,17 +16,17 @@ pub(crate) fn fnv1a(text: &str) -> u64 {
 }
 
 #[test]
-fn the_pinned_schema_hash_is_that_of_the_types() {
+fn the_schema_hash_matches_the_types() {
     let description = description();
     let hash = fnv1a(&description);
     assert_eq!(
         SCHEMA_HASH, hash,
-        "the messages have changed: they may only be appended to; raise PROTOCOL_VERSION, set SCHEMA_HASH to {hash:#018X}:\n{description}"
+        "the messages have changed and must be append-only: raise PROTOCOL_VERSION, set SCHEMA_HASH to {hash:#018X}:\n{description}"
     );
 }
 
 #[test]
-fn the_samples_hold_every_message_in_the_order_of_its_number() {
+fn the_samples_cover_every_message_in_the_order_of_numbers() {
     let expected = [
         "Hello",
         "Place",
@@ -52,13 +52,13 @@ fn the_samples_hold_every_message_in_the_order_of_its_number() {
         assert!(line.starts_with(&format!("{number} {}", expected[number])), "{line}");
     }
     assert_eq!(described.len(), expected.len());
-    // A message or an outcome with the next number would need a sample here.
+    // A message or an outcome with the next number needs a sample.
     assert!(!is_known::<Message>(&[expected.len() as u8]));
     assert!(is_known::<Message>(&[14, 0, 3]) && !is_known::<Message>(&[14, 0, 4]));
 }
 
 #[test]
-fn the_samples_hold_every_command_and_setting_in_the_order_of_its_number() {
+fn the_samples_cover_every_command_and_setting_in_the_order_of_numbers() {
     let expected = [
         "0 Info",
         "1 GetMap",
@@ -90,7 +90,7 @@ fn the_samples_hold_every_command_and_setting_in_the_order_of_its_number() {
     assert!(is_known::<Request>(&[0, 7, 8]) && !is_known::<Request>(&[0, 7, 9]));
 }
 
-/// Whether bytes begin a message or request that is known: zeros are a value of every type.
+/// Whether bytes begin a known message or request: zeros are a value of every type.
 fn is_known<M: Payload>(begin: &[u8]) -> bool {
     (0..100).any(|zeros| {
         let mut body = vec![M::VERSION, 0, 0];
@@ -160,7 +160,7 @@ macro_rules! by_type {
     };
 }
 
-/// The messages hold none of these.
+/// The messages have no values of these types.
 macro_rules! never {
     ($($method:ident($($type:ty),*) -> $result:ty,)*) => {
         $(fn $method(self, $(_: $type),*) -> $result { Err(std::fmt::Error) })*

@@ -1,9 +1,9 @@
-//! `docs/wire.md` is the specification: its examples, tables and constants are checked here against the library.
+//! `docs/wire.md` is the specification: these tests check its examples, tables and constants against the library.
 
 use std::fmt::Debug;
 
 use super::samples::{largest, largest_requests, requests, typical};
-use super::{frame, hear, schema};
+use super::{decode, frame, schema};
 use toposlam::FaultKind;
 use toposlam::wire::{
     CHUNK_BYTES, Decoder, Encoder, FRAME_VERSION, GoalState, MAX_FRAME_BYTES, PROTOCOL_VERSION, Payload, Progress,
@@ -12,7 +12,7 @@ use toposlam::wire::{
 
 const SPECIFICATION: &str = include_str!("../../../docs/wire.md");
 
-/// The contents of the code blocks that are marked with a word.
+/// The contents of the code blocks with an info string.
 fn blocks(word: &str) -> Vec<&'static str> {
     let open = format!("```{word}\n");
     SPECIFICATION.split(&open).skip(1).map(|rest| rest.split("```").next().unwrap_or_default()).collect()
@@ -30,7 +30,7 @@ fn examples(kind: &str) -> Vec<Example> {
         let start = format!("{word}: ");
         block.lines().find_map(|line| line.strip_prefix(start.as_str())).unwrap_or_else(|| panic!("{word} in {block}"))
     };
-    let byte = |hex: &str| u8::from_str_radix(hex, 16).unwrap_or_else(|_| panic!("{hex} is no byte"));
+    let byte = |hex: &str| u8::from_str_radix(hex, 16).unwrap_or_else(|_| panic!("{hex} is not a byte"));
     blocks(kind)
         .into_iter()
         .map(|block| Example {
@@ -51,10 +51,10 @@ fn wanted<M: Payload + Debug>(sequence: u16, message: &M) -> String {
 }
 
 #[test]
-fn every_example_is_packed_and_read_as_it_says() {
+fn every_message_example_encodes_and_decodes() {
     for example in examples("example") {
-        let heard = hear(&example.frame);
-        let [(header, message)] = heard.messages[..] else { panic!("{} is no message", example.message) };
+        let decoded = decode(&example.frame);
+        let [(header, message)] = decoded.messages[..] else { panic!("{} is not a message", example.message) };
         assert_eq!(format!("{message:?}"), example.message);
         assert_eq!(header.sequence, example.sequence);
         assert_eq!(hex(&frame(&mut Encoder::new(example.sequence), &message)), hex(&example.frame));
@@ -62,11 +62,11 @@ fn every_example_is_packed_and_read_as_it_says() {
 }
 
 #[test]
-fn every_example_of_a_request_is_packed_and_read_as_it_says() {
+fn every_request_example_encodes_and_decodes() {
     for example in examples("request") {
         let mut decoder = Decoder::<Request>::new();
         let Progress::Message { header, message, rest: [] } = decoder.feed(&example.frame) else {
-            panic!("{} is no request", example.message)
+            panic!("{} is not a request", example.message)
         };
         assert_eq!(format!("{message:?}"), example.message);
         assert_eq!(header.sequence, example.sequence);
@@ -75,13 +75,13 @@ fn every_example_of_a_request_is_packed_and_read_as_it_says() {
 }
 
 #[test]
-fn every_command_and_setting_has_its_example() {
+fn every_command_and_setting_has_an_example() {
     let wanted: String = requests().iter().zip(0..).map(|(request, sequence)| wanted(sequence, request)).collect();
     assert_eq!(blocks("request").concat(), wanted);
 }
 
 #[test]
-fn every_kind_of_message_has_its_example() {
+fn every_kind_of_message_has_an_example() {
     let wanted: String = typical().iter().zip(0..).map(|(message, sequence)| wanted(sequence, message)).collect();
     assert_eq!(blocks("example").concat(), wanted);
 }
@@ -106,7 +106,7 @@ fn the_specification_states_the_versions_and_the_largest_frame() {
 }
 
 #[test]
-fn the_specification_lists_every_kind_that_is_one_byte_with_its_number() {
+fn the_specification_lists_every_one_byte_enum_with_its_numbers() {
     fn listed<T: Debug>(numbered: impl Iterator<Item = (u8, T)>) {
         let list: Vec<_> = numbered.map(|(number, kind)| format!("{number} {kind:?}")).collect();
         assert!(SPECIFICATION.contains(&(list.join(", ") + ";")), "{}", list.join(", "));
@@ -114,14 +114,14 @@ fn the_specification_lists_every_kind_that_is_one_byte_with_its_number() {
     listed(FaultKind::ALL.iter().map(|&kind| (kind as u8, kind)));
     listed(ResetCause::ALL.iter().map(|&kind| (kind.into(), kind)));
     listed(GoalState::ALL.iter().map(|&kind| (kind.into(), kind)));
-    // Each refusal has a line of its own.
+    // Each refusal has its own line.
     for &refusal in Refusal::ALL {
         assert!(SPECIFICATION.contains(&format!("| {} | {refusal:?} |", u8::from(refusal))), "{refusal:?}");
     }
 }
 
 #[test]
-fn a_kind_that_is_not_known_is_read_as_the_first() {
+fn an_unknown_enum_number_decodes_to_the_first_variant() {
     for number in 0..=u8::MAX {
         let known = |kind: u8| if kind == 0 { 0 } else { number };
         assert_eq!(u8::from(ResetCause::from(number)), known(ResetCause::from(number).into()));
@@ -151,7 +151,7 @@ fn costs<M: Payload + Debug>(typical: &[M], largest: &[M]) -> String {
 }
 
 #[test]
-fn the_tables_of_costs_are_what_the_frames_take() {
+fn the_tables_of_costs_match_the_frame_lengths() {
     for costs in [costs(&typical(), &largest()), costs(&requests(), &largest_requests())] {
         assert!(SPECIFICATION.contains(&costs), "the table is\n{costs}");
     }

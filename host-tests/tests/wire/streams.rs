@@ -1,8 +1,8 @@
-//! Streams to which something has happened, for the golden file: what a line does to them, what a robot does, and what nobody should.
+//! Damaged streams for the golden file: line errors, restarts of the robot, and invalid payloads.
 
 use super::damage::with_crc;
 use super::samples::{extremes, largest, requests, typical};
-use super::{frame, hear};
+use super::{decode, frame};
 use toposlam::wire::{
     Belief, Encoder, FRAME_VERSION, GoalState, GoalStatus, Hello, List, Location, Message, Remapped, ResetCause,
     VertexProbability, Worst, crc32,
@@ -14,7 +14,7 @@ pub(crate) fn lossy(frames: &[Vec<u8>]) -> Vec<u8> {
     let mut bytes = vec![0];
     let mut overtaken: &[u8] = &[];
     for (number, frame) in frames.iter().enumerate() {
-        // The last round comes whole.
+        // The last round is not damaged.
         match if number + 40 > frames.len() { 9 } else { draw.below(20) } {
             0 => {}
             1 => bytes.extend([&frame[..], frame].concat()),
@@ -25,9 +25,9 @@ pub(crate) fn lossy(frames: &[Vec<u8>]) -> Vec<u8> {
     bytes
 }
 
-/// The same robot twice, the second time as its next start and not from its first frame.
+/// The same robot twice; the second time after a restart and without its first frames.
 pub(crate) fn restarted(frames: &[Vec<u8>]) -> Vec<u8> {
-    let Message::Hello(hello) = hear(&frames[0]).messages[0].1 else { panic!("a robot introduces itself first") };
+    let Message::Hello(hello) = decode(&frames[0]).messages[0].1 else { panic!("the first message is a Hello") };
     let again = Message::Hello(Hello { boot: hello.boot.wrapping_add(1), reset_cause: ResetCause::Watchdog, ..hello });
     [&frames[..60].concat()[..], &[0], &frame(&mut Encoder::new(0), &again), &frames[1..30].concat()].concat()
 }
@@ -48,7 +48,7 @@ pub(crate) fn every_damage() -> Vec<u8> {
         &[0],
         &with_crc(&[FRAME_VERSION + 1, 3, 0, 4, 1, 2, 1]),
         &request,
-        // After a gap a message that is not known here is not taken for received, in order it is.
+        // An unknown message counts as received in sequence, and not after a gap.
         &with_crc(&[FRAME_VERSION, 9, 0, 0x7F]),
         &edge(4, 5),
         &with_crc(&[FRAME_VERSION, 5, 0, 4, 1, 2, 1, 9]),
@@ -69,7 +69,7 @@ pub(crate) fn wrapping() -> Vec<u8> {
     numbers.iter().flat_map(|&number| frame(&mut Encoder::new(number), &edge)).collect()
 }
 
-/// Each list with one element more than it can have, and a number of elements beyond all bounds.
+/// Each list with one element too many, and lengths that overflow.
 pub(crate) fn long_lists() -> Vec<u8> {
     let list = |head: &[u8], count: u8, element: &[u8]| {
         let body = [&[FRAME_VERSION, 0, 0], head, &[count], &element.repeat(count.into())].concat();
@@ -83,7 +83,7 @@ pub(crate) fn long_lists() -> Vec<u8> {
         list(&[14, 0, 2, 0, 0], 65, &[1]),
         with_crc(&[FRAME_VERSION, 0, 0, 12, 0, 0xFF, 0xFF, 0xFF, 0xFF, 0xFF, 0xFF, 0xFF, 0xFF, 0xFF, 1]),
         with_crc(&[FRAME_VERSION, 0, 0, 12, 0, 0xFF, 0xFF, 0xFF, 0xFF, 0xFF, 0xFF, 0xFF, 0xFF, 0xFF, 3]),
-        // A varint may be longer than it has to be, and names no value beyond its type.
+        // A varint may have redundant bytes, and must not exceed the range of its type.
         with_crc(&[FRAME_VERSION, 0, 0, 12, 0x80, 0x80, 0, 0x81, 0, 7]),
         with_crc(&[FRAME_VERSION, 1, 0, 12, 0xFF, 0xFF, 0xFF, 0xFF, 0x0F, 0]),
         with_crc(&[FRAME_VERSION, 2, 0, 12, 0xFF, 0xFF, 0xFF, 0xFF, 0x1F, 0]),
@@ -92,7 +92,7 @@ pub(crate) fn long_lists() -> Vec<u8> {
     .concat()
 }
 
-/// The frames of a small map, whose vertices get new numbers again and again.
+/// The frames of a small map whose vertex ids change repeatedly.
 pub(crate) fn renamed() -> Vec<Vec<u8>> {
     let canonical: [&[u8]; 3] =
         [&[2], &[232, 3, 1, 0, 0, 0, 2, 0, 0, 0, 0, 0, 0, 0], &[232, 3, 1, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0]];
@@ -108,7 +108,7 @@ pub(crate) fn renamed() -> Vec<Vec<u8>> {
         Message::Edge { a: 1, b: 5, present: true },
         vertex(5),
         map,
-        // What is gone does not come back with its number.
+        // A removed vertex does not return with its id.
         vertex(5),
         map,
         names(&[0, 1]),
@@ -133,7 +133,7 @@ pub(crate) fn renamed() -> Vec<Vec<u8>> {
     messages.iter().map(|message| frame(&mut encoder, message)).collect()
 }
 
-/// Some bytes changed, left out, doubled or put in.
+/// Changes, removes, repeats and inserts some bytes.
 pub(crate) fn damage(mut bytes: Vec<u8>, draw: &mut Draw) -> Vec<u8> {
     for _ in 0..5 {
         let place = draw.below(bytes.len());
@@ -157,7 +157,7 @@ pub(crate) fn damage(mut bytes: Vec<u8>, draw: &mut Draw) -> Vec<u8> {
     bytes
 }
 
-/// Intact frames that are near to those of messages.
+/// Intact frames with mutated messages.
 pub(crate) fn foreign_payloads(draw: &mut Draw) -> Vec<u8> {
     let messages: Vec<Message> = typical().into_iter().chain(largest()).chain(extremes()).collect();
     let mut bytes = Vec::new();
@@ -165,7 +165,7 @@ pub(crate) fn foreign_payloads(draw: &mut Draw) -> Vec<u8> {
         let message = messages[draw.below(messages.len())];
         let mut body = unpacked(&frame(&mut Encoder::new(sequence), &message));
         for _ in 0..draw.below(4) {
-            // Rarely in the header.
+            // Rarely mutate the header.
             let place = if draw.below(12) == 0 { draw.below(3) } else { 3 + draw.below(body.len() - 3) };
             let byte = draw.byte();
             match draw.below(5) {
@@ -190,7 +190,7 @@ fn unpacked(frame: &[u8]) -> Vec<u8> {
     raw[1..raw.len() - 4].to_vec()
 }
 
-/// Numbers at random that are the same everywhere: SplitMix64.
+/// Reproducible pseudo-random numbers: SplitMix64.
 pub(crate) struct Draw(pub(crate) u64);
 
 impl Draw {

@@ -21,7 +21,7 @@ use crate::place::Fingerprint;
 #[derive(Clone, Debug)]
 pub struct History<const WORDS: usize> {
     slots: [[Fingerprint; 32]; WORDS],
-    /// How many observations there were in all; the newest is in slot `pushed − 1` modulo the capacity.
+    /// The number of observations in total; the newest is in slot `pushed − 1` modulo the capacity.
     pushed: u32,
 }
 
@@ -85,7 +85,7 @@ impl<const WORDS: usize> History<WORDS> {
         (self.pushed as usize).wrapping_sub(1) % Self::CAPACITY
     }
 
-    /// The slot behind the newest observation: that of the oldest one in a full ring, else a free one.
+    /// The slot after the newest observation: that of the oldest one in a full ring, else a free one.
     pub(crate) fn slot_behind_newest(&self) -> usize {
         self.pushed as usize % Self::CAPACITY
     }
@@ -106,7 +106,7 @@ mod tests {
     }
 
     #[test]
-    fn a_full_history_drops_the_oldest_and_says_so() {
+    fn a_full_history_drops_the_oldest_and_reports_it() {
         let mut history = History::<1>::new();
         for steps in 0..32 {
             assert_eq!(history.push(fingerprint(steps)), None);
@@ -120,7 +120,7 @@ mod tests {
     }
 
     #[test]
-    fn the_ring_runs_on_when_its_counter_is_full() {
+    fn the_ring_continues_when_its_counter_overflows() {
         let mut history = History::<2>::new();
         history.pushed = u32::MAX;
         for steps in 0..100 {

@@ -156,7 +156,7 @@ mod tests {
     }
 
     #[test]
-    fn one_vertex_pays_the_penalty_of_its_likeness_to_itself() {
+    fn a_single_vertex_has_the_penalty_of_its_similarity_to_itself() {
         for penalty_permille in [0, 100, 500, 999] {
             let likelihood = likelihood(PaperConfig { penalty_permille, ..PaperConfig::DEFAULT });
             let expected = (1.0 - f64::from(penalty_permille) / 1000.0).ln();
@@ -174,7 +174,7 @@ mod tests {
     }
 
     #[test]
-    fn the_size_changes_by_what_another_label_brings() {
+    fn a_changed_label_changes_the_size_penalty_exactly() {
         let labels = [1000, 1050, 1010, 3000].map(fingerprint);
         for sigma_label_mm in [20, 50, 300, 5000] {
             let likelihood = likelihood(PaperConfig { sigma_label_mm, ..PaperConfig::DEFAULT });

@@ -32,7 +32,7 @@ impl<const V: usize> Particle<V> {
     };
 }
 
-/// Predicts that the robot of a particle goes to a vertex, which may be a new one behind the last: adds the edge if it is
+/// Predicts that the robot of a particle goes to a vertex, which may be a new one after the last: adds the edge if it is
 /// missing, and the observation to the label of the vertex.
 pub(super) fn predict<const V: usize>(
     predicted: &mut Map<V>,

@@ -26,7 +26,7 @@ pub(super) struct Particles<const N: usize, const V: usize> {
     distinct: u8,
     best: u8,
     wanted: u8,
-    /// For every particle, one candidate a vertex, and the new vertex behind the last one while there is room.
+    /// For every particle, one candidate per vertex, and the new vertex after the last one while there is room.
     pool: [PerVertex<Candidate, V>; N],
     predicted: Map<V>,
     likelihood: Likelihood,

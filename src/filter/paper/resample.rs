@@ -13,8 +13,8 @@ pub(super) const PROPOSAL_REACH: i32 = 15 * NAT;
 /// A proposal that fits the evidence this many nats worse than the best is never accepted: e⁻²³ · 2³² rounds to 0.
 pub(super) const ACCEPTANCE_REACH: i32 = 23 * NAT;
 
-/// A prediction that fits the evidence this much worse than the best has a weight that rounds to 0, whatever its Eq. 7 and 9
-/// are, so its distance does not matter.
+/// A prediction that fits the evidence this much worse than the best has a weight that rounds to 0, for any Eq. 7
+/// and 9, so its distance does not matter.
 pub(super) const DISTANCE_REACH: i32 = PROPOSAL_REACH + ACCEPTANCE_REACH;
 
 /// After this many proposals a step computes Eq. 8 of all predictions and draws the rest without rejection. This bounds the

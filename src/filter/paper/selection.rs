@@ -10,7 +10,7 @@ use crate::map::PerVertex;
 use crate::map::{Map, VertexId};
 use crate::place::Fingerprint;
 
-/// A prediction: the robot of a particle goes to a vertex, which may be a new one behind the last. Ordered as the pool is.
+/// A prediction: the robot of a particle goes to a vertex, which may be a new one after the last. Ordered like the pool.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(super) struct Choice {
     pub(super) parent: u8,
@@ -244,7 +244,7 @@ impl<E: Evidence<WORDS>, const N: usize, const V: usize, const WORDS: usize, con
         self.candidate(choice).map_or(i32::MIN, |candidate| candidate.ln_proposal)
     }
 
-    /// By how much ln of Eq. 8 of a prediction is behind that of the nearest one.
+    /// The difference between ln of Eq. 8 of the nearest prediction and of this one.
     fn ln_behind(&mut self, choice: Choice) -> i32 {
         let ln_nearest = self.likelihood.ln_consistency(self.nearest_mm);
         match self.distance(choice, DISTANCE_REACH) {
@@ -253,8 +253,8 @@ impl<E: Evidence<WORDS>, const N: usize, const V: usize, const WORDS: usize, con
         }
     }
 
-    /// The distance of a prediction, computed if it is not known yet. It matters while ln of Eq. 8 is at most `reach` behind that of
-    /// the nearest prediction.
+    /// The distance of a prediction, computed if it is not known yet. It matters while ln of Eq. 8 is at most
+    /// `reach` below that of the nearest prediction.
     fn distance(&mut self, choice: Choice, reach: i32) -> Distance {
         let known = self.candidate(choice).map_or(Distance::TooLarge, |candidate| candidate.distance);
         if known != Distance::Unknown {

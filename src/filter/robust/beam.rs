@@ -28,7 +28,7 @@ impl Prediction {
 #[derive(Clone, Debug)]
 pub(crate) struct Beam<const N: usize, const V: usize, const T: usize> {
     slots: [Hypothesis<V, T>; N],
-    /// The slots of the hypotheses, the best first; behind `len` the free ones.
+    /// The slots of the hypotheses, the best first; after `len` the free ones.
     order: [u8; N],
     len: usize,
 }
@@ -64,7 +64,7 @@ impl<const N: usize, const V: usize, const T: usize> Beam<N, V, T> {
         self.len = 0;
     }
 
-    /// Puts a hypothesis behind the others, unless there is no room or one with the same map and vertex of the robot.
+    /// Appends a hypothesis, unless the beam is full or has one with the same map and vertex of the robot.
     #[cfg(feature = "snapshot")]
     pub(crate) fn append(&mut self, hypothesis: &Hypothesis<V, T>) {
         let key = hypothesis.key();

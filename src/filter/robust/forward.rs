@@ -26,7 +26,7 @@ impl<const V: usize> Forward<V> {
 
     /// Updates the bound of the map's other paths, and the belief.
     ///
-    /// Let the labels' posterior be what the path of the hypothesis says, and weigh each label by the expectation of its log
+    /// Take the labels' posterior given the path of the hypothesis, and weigh each label by the expectation of its log
     /// density under it ([`Emissions::Expected`]). Then the evidence of the path plus
     ///
     /// ```text

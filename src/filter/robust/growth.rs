@@ -34,7 +34,7 @@ impl<const V: usize, const T: usize> Hypothesis<V, T> {
         let from = if observation.starts_sequence() { None } else { self.at };
         let before = vertex.map_or(VertexStatistics::NONE, |vertex| self.statistics[vertex]);
         let degree_before = vertex.map_or(0, |vertex| self.degree(vertex));
-        // A new vertex has the number behind the last, even where there is no room for it.
+        // A new vertex has the id after the last, even where there is no room for it.
         let at = vertex.or(VertexId::new(self.vertices));
         let mut after = before;
         after.include(observation);
@@ -107,7 +107,7 @@ impl<const V: usize, const T: usize> Hypothesis<V, T> {
     }
 
     /// Adds the newest observation, number `index` of the history, to a vertex, for a gain that was computed before. A new
-    /// vertex has the number behind the last.
+    /// vertex has the id after the last.
     pub(super) fn extend(
         &mut self,
         model: &Model,

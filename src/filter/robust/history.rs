@@ -139,7 +139,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn an_observation_is_the_same_after_packing() {
+    fn packed_observations_round_trip() {
         let mut history = ObservationHistory::<8>::new();
         let turns = [None, Some(Turn::Back), Some(Turn::On)];
         for (steps, turn) in [0, 1, Fingerprint::MAX.steps()].into_iter().zip(turns) {

@@ -41,8 +41,8 @@ pub(super) trait Semiring {
     /// Takes the column of the next observation: adds states to it, weighs it.
     fn enter(&mut self, stage: &Stage, column: &mut Column);
 
-    /// The value of all paths to the last observation of a sequence, whose column and cells are given: a factor of the paths that
-    /// start behind it. `rows` of the cells are in use.
+    /// The value of all paths to the last observation of a sequence, whose column and cells are given: a factor of the
+    /// paths that start after it. `rows` of the cells are in use.
     fn close(&mut self, stage: &Stage, column: &Column, cells: &Cells, rows: usize) -> f32;
 
     /// The value of the paths that start with a state, from the vertex before the history if there is one.

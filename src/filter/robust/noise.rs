@@ -33,9 +33,9 @@ const LARGEST_STEPS: f32 = 150.0;
 /// s = min(√(Σ Q / Σ (n − 1)), 1.5 q / 0.82)
 /// ```
 ///
-/// The first term is the scatter about the vertices, pooled over the map. A map that takes several places for one has too much
+/// The first term is the scatter about the vertices, pooled over the map. A map that merges distinct places has too much
 /// scatter and would justify itself, so the second term limits it: q is the 0.2 quantile of the differences between each
-/// label and the second last one before it, which are small wherever the robot turned back, whatever the map is. A robot that
+/// label and the second last one before it, which are small wherever the robot turned back, on any map. A robot that
 /// never turns back has no such limit. The result is limited to the resolution of the fingerprints, and to 4 to 300 mm.
 /// Cost: O(T).
 pub(super) fn deviation_steps<const V: usize, const T: usize>(

@@ -28,7 +28,7 @@ pub(super) fn digamma(x: f32) -> f32 {
 mod tests {
     use super::*;
 
-    /// ln Γ and its derivative in f64, by Stirling's series behind a shift to 20.
+    /// ln Γ and its derivative in f64, by Stirling's series after a shift to 20.
     fn in_f64(x: f64) -> (f64, f64) {
         let (mut x, mut ln_product, mut sum) = (x, 0.0, 0.0);
         while x < 20.0 {
@@ -43,7 +43,7 @@ mod tests {
     }
 
     #[test]
-    fn the_gamma_function_is_as_exact_as_stated() {
+    fn the_gamma_function_meets_its_stated_accuracy() {
         let (mut worst, mut worst_relative, mut worst_derivative) = (0.0_f64, 0.0_f64, 0.0_f64);
         // From 0.25 to 16 by 1/64, then the halves that visits give, as far as they are counted.
         let grid = (16..1024).map(|step| step as f32 / 64.0).chain((32..131_072).map(|half| half as f32 / 2.0));

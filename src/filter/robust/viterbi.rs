@@ -11,8 +11,8 @@ use crate::map::{VertexId, VertexSet32};
 use rand_core::Rng;
 use rand_xoshiro::Xoshiro128PlusPlus;
 
-/// Where the best paths into a slot come from: the two best slots before, and for each slot of the column behind whether the
-/// best path to it turned back.
+/// Where the best paths into a slot come from: the two best slots before, and for each slot of the next column
+/// whether the best path to it turned back.
 #[derive(Clone, Copy, Debug)]
 struct Back {
     best: Slot,
@@ -132,7 +132,7 @@ struct BestPath<'a, const V: usize> {
     backs: &'a mut [PerSlot<u16>],
     /// ln of the probability of each vertex at the start of a sequence.
     ln_start: f32,
-    /// For each slot behind whether the best path to it turned back in the current one.
+    /// For each next slot, whether the best path to it turned back in the current one.
     turned: u8,
     /// Where the best path to each slot comes from, when the cells are one row.
     origins: PerSlot<Slot>,

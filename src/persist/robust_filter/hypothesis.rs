@@ -11,11 +11,11 @@ pub(super) const FIXED_BYTES: usize = 3 + 3 * 4;
 /// Vertices, starts and hints of the map while the filter only localises.
 pub(super) const KEPT_BYTES: usize = 1 + 2 + 4;
 
-/// No sum of logarithms is beyond this.
+/// Bound of every sum of logarithms.
 const MOST_NATS: f32 = 1e9;
 
 impl<const V: usize, const T: usize> Hypothesis<V, T> {
-    /// Writes the statistics of the map while the filter only localises: they do not follow from the path.
+    /// Writes the statistics of the map. While the filter only localises, the path does not determine them.
     pub(super) fn save_kept(&self, writer: &mut Writer<'_>) -> Result<(), SnapshotError> {
         writer.u8(self.vertices)?;
         writer.u16(self.starts)?;
@@ -32,7 +32,7 @@ impl<const V: usize, const T: usize> Hypothesis<V, T> {
         Ok(())
     }
 
-    /// Takes the statistics of the map of another hypothesis, while the filter only localises.
+    /// Copies the statistics of the map from another hypothesis, while the filter only localises.
     pub(super) fn keep_map_of(&mut self, other: &Self) {
         self.starts = other.starts;
         self.ln_hints = other.ln_hints;
@@ -58,8 +58,8 @@ impl<const V: usize, const T: usize> Hypothesis<V, T> {
         Ok(())
     }
 
-    /// Reads what was saved. While the filter only localises, the statistics of the map must have been read before; else
-    /// [`Hypothesis::recount`] is to follow.
+    /// Reads a saved hypothesis. While the filter only localises, the statistics of the map must be read first;
+    /// otherwise [`Hypothesis::recount`] must follow.
     pub(super) fn read(&mut self, from: &mut Reader<'_>, len: usize, localise_only: bool) -> Result<(), SnapshotError> {
         let vertices = from.u8()?;
         let before = from.u8()?;

@@ -1,7 +1,7 @@
-//! The robust filter in a snapshot: everything that cannot be recomputed from the places and the paths.
+//! The robust filter in a snapshot: the state that cannot be recomputed from the places and the paths.
 //!
-//! Of a hypothesis a snapshot has the path and the marginalised statistics; map, statistics and evidence are
-//! recomputed. Saving recomputes them in the running filter too, so that it and a restored one are equal, bit for bit.
+//! A snapshot holds the path and the marginalised statistics of each hypothesis; map, statistics and evidence are
+//! recomputed. Saving recomputes them in the running filter too, so that it equals a restored one bit for bit.
 
 mod hypothesis;
 mod parts;
@@ -13,13 +13,13 @@ use crate::persist::Persist;
 use crate::persist::snapshot::{FILTER_SECTION, FRAME_BYTES, Reader, SnapshotError, Writer};
 use parts::{STATISTICS_BYTES, path_bytes, row_bytes};
 
-/// What the contents of the filter's section begin with.
+/// The first byte of the filter's section: the kind of filter.
 const ROBUST: u8 = 1;
 
-/// The scale of the noise is within these, in steps².
+/// Bounds of the noise scale 2 σ², in steps².
 const SCALES: core::ops::RangeInclusive<f32> = 0.1..=1e6;
 
-/// What is neither history, map nor hypothesis.
+/// The fixed fields of the section, without history, map and hypotheses.
 #[derive(Clone, Copy)]
 struct Head {
     config: RobustConfig,
@@ -33,7 +33,7 @@ struct Head {
 const HEAD_BYTES: usize = 4 + 10 + 8 + 4 + 4 + 1 + 4;
 
 impl<const N: usize, const V: usize, const HISTORY: usize> RobustFilter<N, V, HISTORY> {
-    /// The largest snapshot of this filter alone, in bytes: with `N` hypotheses of `V` vertices and a full history.
+    /// The largest snapshot of this filter alone in bytes: `N` hypotheses of `V` vertices and a full history.
     pub const SNAPSHOT_BYTES: usize = {
         let counted = V * (STATISTICS_BYTES + row_bytes(V));
         let told = 1 + V * (11 + row_bytes(V)) + 4 + 1 + V + path_bytes(V, HISTORY);
@@ -45,7 +45,7 @@ impl<const N: usize, const V: usize, const HISTORY: usize> RobustFilter<N, V, HI
 impl<const N: usize, const V: usize, const HISTORY: usize> Persist for RobustFilter<N, V, HISTORY> {
     const SECTION: u8 = FILTER_SECTION;
 
-    /// Writes settings, places, the published map, and the hypotheses, the best first, as many as there is room for.
+    /// Writes settings, places, the published map, and as many hypotheses as fit, the best first.
     ///
     /// A buffer of [`RobustFilter::SNAPSHOT_BYTES`] has room for all of them; the restored filter then equals this one, bit for
     /// bit. Cost: one pass over the history for each hypothesis.
@@ -95,7 +95,7 @@ impl<const N: usize, const V: usize, const HISTORY: usize> Persist for RobustFil
         self.read(section, true)
     }
 
-    /// Cost: a pass over the bytes.
+    /// Cost: one pass over the bytes.
     fn check(&mut self, section: Reader<'_>) -> Result<(), SnapshotError> {
         self.read(section, false)
     }
@@ -144,7 +144,7 @@ impl<const N: usize, const V: usize, const HISTORY: usize> RobustFilter<N, V, HI
     /// Brings the filter into the state that its own snapshot restores.
     fn make_canonical(&mut self) {
         if self.localise_only {
-            // The map is kept as it is, so all have that of the best one.
+            // The map is fixed, so every hypothesis has the map of the best one.
             if let Some(best) = self.beam.best() {
                 self.draft.clone_from(best);
                 let kept = &self.draft;

@@ -1,4 +1,4 @@
-//! The parts of a snapshot: observations, statistics, edges, paths, and what was published last.
+//! The parts of a snapshot: observations, statistics, edges, paths, and the last published result.
 
 use crate::filter::RobustFilter;
 use crate::filter::robust::history::{ObservationHistory, PackedObservation};
@@ -14,17 +14,17 @@ pub(super) const NOWHERE: u8 = u8::MAX;
 /// Two floats, two counts, seven degrees.
 pub(super) const STATISTICS_BYTES: usize = 4 + 4 + 2 + 2 + 7;
 
-/// One in the unit of probabilities.
+/// Probability 1 in units of 2⁻¹⁶.
 const ONE_Q16: u32 = 1 << 16;
 
 /// The most marginalised visits of a vertex: each vertex decays, and all may have been merged into one. The history may contain as
 /// many.
 const MOST_VISITS: u16 = 32 * DECAY_VISITS;
 
-/// A mean may be off a label by its rounding.
+/// Bound of a mean label: the largest label plus the rounding error of the mean.
 const MOST_MEAN: f32 = Fingerprint::MAX.steps() as f32 + 1.0;
 
-/// More than any sum of squared distances of so many labels, in steps².
+/// Upper bound of the sum of squared distances of the labels, in steps².
 const MOST_SCATTER: f32 = 1e12;
 
 /// Bytes of the neighbours of one vertex.
@@ -32,7 +32,7 @@ pub(super) const fn row_bytes(vertices: usize) -> usize {
     if vertices <= 16 { 2 } else { 4 }
 }
 
-/// Bytes of a path of so many places: two places a byte as long as that is enough.
+/// Bytes of a path: two places per byte while the ids fit 4 bits.
 pub(super) const fn path_bytes(vertices: usize, places: usize) -> usize {
     if vertices <= 16 { places.div_ceil(2) } else { places }
 }
@@ -41,14 +41,14 @@ pub(super) fn save_row<const V: usize>(writer: &mut Writer<'_>, row: VertexSet32
     if row_bytes(V) == 2 { writer.u16(row.bits() as u16) } else { writer.u32(row.bits()) }
 }
 
-/// Reads the neighbours of a vertex of a map with so many vertices.
+/// Reads the neighbours of a vertex of a map with `vertices` vertices.
 #[inline(never)]
 pub(super) fn read_row<const V: usize>(from: &mut Reader<'_>, vertices: u8) -> Result<VertexSet32, SnapshotError> {
     let row = VertexSet32::from_bits(if row_bytes(V) == 2 { from.u16()?.into() } else { from.u32()? });
     if (row - VertexSet32::first(vertices.into())).is_empty() { Ok(row) } else { Err(SnapshotError::Contents) }
 }
 
-/// Checks that every edge leads both ways.
+/// Checks that the adjacency matrix is symmetric.
 #[inline(never)]
 pub(super) fn check_symmetry<const V: usize>(neighbours: &PerVertex<VertexSet32, V>) -> Result<(), SnapshotError> {
     let is_symmetric = neighbours.iter().all(|(from, set)| set.iter().all(|to| neighbours[to].contains(from)));
@@ -65,7 +65,7 @@ pub(super) fn save_path<const V: usize>(writer: &mut Writer<'_>, path: &[VertexI
     Ok(())
 }
 
-/// Reads a path of so many places through so many vertices, place by place.
+/// Reads a path through a map with `vertices` vertices, place by place.
 #[inline(never)]
 pub(super) fn read_path<const V: usize>(
     from: &mut Reader<'_>,
@@ -88,7 +88,7 @@ pub(super) fn read_path<const V: usize>(
     Ok(())
 }
 
-/// A finite float within some bounds.
+/// Checks that a float is finite and within bounds.
 #[inline(never)]
 pub(super) fn bounded(value: f32, least: f32, most: f32) -> Result<f32, SnapshotError> {
     if value >= least && value <= most { Ok(value) } else { Err(SnapshotError::Contents) }
@@ -113,7 +113,7 @@ impl VertexStatistics {
         };
         let degrees = from.bytes(statistics.degrees.len())?;
         statistics.degrees.iter_mut().zip(degrees).for_each(|(to, &count)| *to = count);
-        // A vertex is not left more often than it is reached.
+        // A vertex is left at most as often as it is reached.
         if statistics.visits > 2 * MOST_VISITS
             || statistics.exits > statistics.visits
             || statistics.visits == 0 && statistics != Self::NONE
@@ -134,7 +134,7 @@ impl<const T: usize> ObservationHistory<T> {
         Ok(())
     }
 
-    /// Reads so many places, and takes them over if they are to be `kept`.
+    /// Reads the places; stores them if `kept`.
     pub(super) fn read(&mut self, from: &mut Reader<'_>, len: usize, kept: bool) -> Result<(), SnapshotError> {
         for index in 0..len {
             let (steps, hints) = (from.u16()?, from.u8()?);
@@ -153,7 +153,7 @@ impl<const T: usize> ObservationHistory<T> {
 }
 
 impl<const N: usize, const V: usize, const HISTORY: usize> RobustFilter<N, V, HISTORY> {
-    /// Writes what was published last: the map, the ids of its vertices, the path, and the belief.
+    /// Writes the last published result: the map, the ids of its vertices, the path, and the belief.
     pub(super) fn save_told(&self, writer: &mut Writer<'_>) -> Result<(), SnapshotError> {
         let map = &self.map;
         writer.u8(map.vertices().len() as u8)?;
@@ -173,8 +173,7 @@ impl<const N: usize, const V: usize, const HISTORY: usize> RobustFilter<N, V, HI
         save_path::<V>(writer, ids.path.get(..self.history.len()).unwrap_or(&[]))
     }
 
-    /// Reads what was told last after so many places, and takes it over if it is to be `kept`; returns how many vertices its
-    /// map has.
+    /// Reads the last published result; stores it if `kept`. Returns the number of vertices of its map.
     pub(super) fn read_told(&mut self, from: &mut Reader<'_>, len: usize, kept: bool) -> Result<u8, SnapshotError> {
         let vertices = from.u8()?;
         if usize::from(vertices) > V {

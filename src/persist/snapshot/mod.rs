@@ -69,7 +69,7 @@ pub enum SnapshotError {
         /// The version of the snapshot.
         found: u16,
     },
-    /// The snapshot is of another kind of filter, or of other capacities.
+    /// The snapshot was written by another kind of filter, or one with other capacities.
     Capacities,
     /// The contents are invalid.
     Contents,
@@ -146,25 +146,25 @@ mod tests {
     }
 
     #[test]
-    fn sections_come_back_by_their_tags_and_unknown_ones_are_none() {
+    fn sections_are_found_by_tag_and_unknown_tags_are_none() {
         let mut buffer = [0xAA; 100];
         let length = two_sections(&mut buffer).unwrap();
         assert_eq!(length, HEADER_BYTES + 2 * SECTION_HEADER_BYTES + 2 + 13 + CRC_BYTES);
-        // What lies behind the snapshot does not matter.
+        // Bytes after the snapshot are ignored.
         for bytes in [&buffer[..length], &buffer[..]] {
             let snapshot = Snapshot::open(bytes).unwrap();
             let mut nine = snapshot.section(9).unwrap();
             assert_eq!((nine.u8(), nine.u64(), nine.f32()), (Ok(1), Ok(2), Ok(-0.5)));
             assert_eq!(nine.finish(), Ok(()));
             let mut seven = snapshot.section(7).unwrap();
-            assert_eq!(seven.finish(), Err(SnapshotError::Contents), "nothing may be left over");
+            assert_eq!(seven.finish(), Err(SnapshotError::Contents), "unread bytes are an error");
             assert_eq!((seven.u16(), seven.u8()), (Ok(0x0102), Err(SnapshotError::TooShort)));
             assert!(snapshot.section(8).is_none());
         }
     }
 
     #[test]
-    fn a_buffer_that_is_too_small_is_full_and_one_that_just_fits_is_not() {
+    fn a_snapshot_needs_exactly_its_length() {
         let mut buffer = [0; 100];
         let length = two_sections(&mut buffer).unwrap();
         for room in 0..length {
@@ -174,7 +174,7 @@ mod tests {
     }
 
     #[test]
-    fn a_section_that_has_no_room_leaves_the_others() {
+    fn a_section_without_room_is_omitted() {
         let mut buffer = [0; HEADER_BYTES + SECTION_HEADER_BYTES + 1 + CRC_BYTES];
         let mut writer = Writer::new(&mut buffer).unwrap();
         writer.section(1, |section| section.u8(5)).unwrap();
@@ -184,7 +184,7 @@ mod tests {
     }
 
     #[test]
-    fn every_bit_and_every_missing_byte_is_noticed() {
+    fn every_flipped_bit_and_every_missing_byte_is_detected() {
         let mut buffer = [0; 100];
         let length = two_sections(&mut buffer).unwrap();
         for bit in 0..8 * length {
@@ -199,7 +199,7 @@ mod tests {
     }
 
     #[test]
-    fn another_version_is_refused_by_its_number() {
+    fn another_version_is_refused() {
         let mut buffer = [0; 100];
         let length = two_sections(&mut buffer).unwrap();
         buffer[4] = 2;
@@ -209,7 +209,7 @@ mod tests {
     }
 
     #[test]
-    fn a_snapshot_is_due_with_every_so_many_places() {
+    fn a_snapshot_is_due_at_the_configured_interval() {
         let policy = SnapshotPolicy { every_places: 3 };
         assert!((0..7).map(|place| policy.is_due(place)).eq([false, false, true, false, false, true, false]));
         assert!(!(0..7).any(|place| SnapshotPolicy { every_places: 0 }.is_due(place)));

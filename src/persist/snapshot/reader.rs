@@ -81,7 +81,7 @@ impl<'a> Reader<'a> {
         Ok((tag, Self { bytes: self.bytes(length)? }))
     }
 
-    /// Reads some bytes.
+    /// Reads `count` bytes.
     ///
     /// # Errors
     /// [`SnapshotError::TooShort`] if fewer are left.
@@ -133,7 +133,7 @@ impl<'a> Reader<'a> {
         self.array().map(u64::from_le_bytes)
     }
 
-    /// Reads a float by its bits; it may be infinite or not a number.
+    /// Reads the bits of a float, which may be infinite or NaN.
     ///
     /// # Errors
     /// As [`Reader::bytes`].

@@ -19,12 +19,12 @@ impl<'a> Writer<'a> {
         let mut writer = Self { bytes: buffer, len: 0 };
         writer.bytes(&MAGIC)?;
         writer.u16(SNAPSHOT_VERSION)?;
-        // The length, when it is known.
+        // Placeholder of the length.
         writer.u32(0)?;
         Ok(writer)
     }
 
-    /// Writes a section. When that fails, the section is left out and more sections can follow.
+    /// Writes a section. On an error the section is omitted and more sections can follow.
     ///
     /// # Errors
     /// Errors of `contents`; [`SnapshotError::Full`] if there is no room.
@@ -41,7 +41,7 @@ impl<'a> Writer<'a> {
         written
     }
 
-    /// Writes the section of a stage. When that fails, the section is left out and more sections can follow.
+    /// Writes the section of a stage. On an error the section is omitted and more sections can follow.
     ///
     /// # Errors
     /// As [`Persist::save`].
@@ -86,7 +86,7 @@ impl<'a> Writer<'a> {
     #[inline(never)]
     pub fn bytes(&mut self, bytes: &[u8]) -> Result<(), SnapshotError> {
         let end = self.len.saturating_add(bytes.len());
-        // The CRC has its room.
+        // The CRC always has room.
         if end.saturating_add(CRC_BYTES) > self.bytes.len() {
             return Err(SnapshotError::Full);
         }
@@ -141,17 +141,17 @@ impl<'a> Writer<'a> {
         self.u32(value.to_bits())
     }
 
-    /// Where the next byte goes.
+    /// The position of the next byte.
     pub(crate) fn mark(&self) -> usize {
         self.len
     }
 
-    /// Takes back what was written since a mark.
+    /// Removes the bytes written since a mark.
     pub(crate) fn rewind(&mut self, mark: usize) {
         self.len = self.len.min(mark);
     }
 
-    /// Writes over what was written at a mark.
+    /// Overwrites the bytes at a mark.
     pub(crate) fn overwrite(&mut self, mark: usize, bytes: &[u8]) {
         for (to, &byte) in self.bytes.iter_mut().take(self.len).skip(mark).zip(bytes) {
             *to = byte;

@@ -1,31 +1,31 @@
-//! Restores a snapshot of the store at the start.
+//! Restores the newest valid snapshot of the store at the start.
 
 use embedded_storage::nor_flash::NorFlash;
 
 use super::{Store, StoreError, Stored};
 use crate::persist::snapshot::{Resume, SnapshotError};
 
-/// What the robot does with the newest snapshot at the start.
+/// Whether the robot restores the newest snapshot at the start.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum BootPolicy {
-    /// It starts with an empty map. The snapshots stay stored until later ones need their room.
+    /// Start with an empty map. The stored snapshots remain until later ones overwrite them.
     Fresh,
-    /// It restores the map, at an unknown vertex: it may have been moved while it was off. The default.
+    /// Restore the map at an unknown vertex, because the robot may have been moved while it was off. The default.
     #[default]
     ContinueAtUnknownVertex,
-    /// It restores the map, where it was when the snapshot was taken. For a robot that is never moved and takes a snapshot
-    /// whenever it stops.
+    /// Restore the map and the vertex of the snapshot. For a robot that is never moved while it is off and takes a
+    /// snapshot whenever it stops.
     ContinueInPlace,
 }
 
 /// The origin of the robot's map.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum BootOutcome {
-    /// The map is empty, as the policy says.
+    /// The map is empty, as the policy demands.
     Fresh,
     /// The map is empty, because no snapshot could be restored.
     Nothing,
-    /// The map is that of a snapshot.
+    /// The map was restored from a snapshot.
     Continued(Stored),
 }
 
@@ -36,15 +36,16 @@ pub struct BootReport {
     pub outcome: BootOutcome,
     /// The number of snapshots that were rejected.
     pub rejected: u8,
-    /// Why the last of them was rejected.
+    /// The reason of the last rejection.
     pub why: Option<SnapshotError>,
     /// The error of the store, if it failed.
     pub store: Option<StoreError>,
 }
 
-/// Restores the newest snapshot that `restore` accepts, if the policy says so. After a damaged snapshot, or one of another
-/// version or other capacities, the previous one is tried. The stages must have been started before; they do not change if
-/// no snapshot is accepted.
+/// Restores the newest snapshot that `restore` accepts, if the policy allows it.
+///
+/// After a damaged snapshot, or one of another version or other capacities, the previous one is tried. The stages must have
+/// been started before; they do not change if no snapshot is accepted.
 pub fn resume<FLASH: NorFlash>(
     store: &mut Store<FLASH>,
     buffer: &mut [u8],

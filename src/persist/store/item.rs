@@ -1,28 +1,28 @@
-//! What a half of the store holds, item by item: pieces of snapshots, their ends, and counts of starts.
+//! The items in a half of the store: pieces of snapshots, end marks, and counts of starts.
 
 /// The largest item.
 pub(super) const ITEM_BYTES: usize = 256;
 /// The tag, the number and the index of a piece.
 const PIECE_HEADER_BYTES: usize = 7;
-/// How much of a snapshot a piece holds; the last one may hold less.
+/// Bytes of a snapshot in a piece; the last piece may hold fewer.
 pub(super) const PIECE_BYTES: usize = ITEM_BYTES - PIECE_HEADER_BYTES;
 
 const PIECE: u8 = 1;
 const END: u8 = 2;
 const STARTS: u8 = 3;
 
-/// An item; all that belongs to one snapshot has one number, and no other has it.
+/// An item. All items of one snapshot share its serial number.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Item<'a> {
     /// A piece of a snapshot.
     Piece { serial: u32, index: u16, bytes: &'a [u8] },
-    /// Says that a snapshot is complete.
+    /// Marks a snapshot as complete.
     End { serial: u32, pieces: u16, length: u32 },
-    /// How often the robot was started.
+    /// The number of starts of the robot.
     Starts { serial: u32, starts: u32 },
 }
 
-/// An item as bytes, aligned as some flashes want it.
+/// A packed item, aligned for flashes that need it.
 #[repr(align(4))]
 pub(super) struct Packed(pub(super) [u8; ITEM_BYTES]);
 
@@ -33,7 +33,7 @@ impl<'a> Item<'a> {
         }
     }
 
-    /// How many bytes the item has when it is packed.
+    /// The length of the packed item in bytes.
     pub(super) const fn length(&self) -> usize {
         match self {
             Self::Piece { bytes, .. } => PIECE_HEADER_BYTES + bytes.len(),
@@ -42,7 +42,7 @@ impl<'a> Item<'a> {
         }
     }
 
-    /// Packs the item; tells how many bytes it has.
+    /// Packs the item; returns its length in bytes.
     #[inline(never)]
     pub(super) fn pack(&self, to: &mut Packed) -> usize {
         let serial = self.serial().to_le_bytes();
@@ -73,7 +73,7 @@ impl<'a> Item<'a> {
         length.min(ITEM_BYTES)
     }
 
-    /// The item that some bytes are; `None` for what is none.
+    /// Unpacks an item; `None` if the bytes are not a valid item.
     #[inline(never)]
     pub(super) fn unpack(bytes: &'a [u8]) -> Option<Self> {
         let (&tag, rest) = bytes.split_first()?;
@@ -98,7 +98,7 @@ impl<'a> Item<'a> {
     }
 }
 
-/// Follows the pieces of a snapshot.
+/// Tracks the pieces of a snapshot.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Assembly {
     serial: u32,
@@ -110,7 +110,7 @@ pub(super) struct Assembly {
 impl Assembly {
     pub(super) const NONE: Self = Self { serial: 0, pieces: 0, length: 0, is_whole: false };
 
-    /// Takes the next item; gives number and length of a snapshot that it completes.
+    /// Processes the next item; returns number and length of a snapshot that it completes.
     #[inline(never)]
     pub(super) fn take(&mut self, item: &Item<'_>) -> Option<(u32, usize)> {
         match *item {
@@ -128,7 +128,7 @@ impl Assembly {
             Item::End { serial, pieces, length } => {
                 let is_complete =
                     self.is_whole && (serial, pieces, length as usize) == (self.serial, self.pieces, self.length);
-                // The empty one has no pieces.
+                // An empty snapshot has no pieces.
                 let is_empty = pieces == 0 && length == 0;
                 let length = self.length;
                 *self = Self::NONE;
@@ -148,7 +148,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn items_come_back_as_they_were_packed() {
+    fn packed_items_unpack_unchanged() {
         let bytes = [7; PIECE_BYTES];
         for item in [
             Item::Piece { serial: 1, index: 2, bytes: &bytes },
@@ -167,7 +167,7 @@ mod tests {
     }
 
     #[test]
-    fn only_all_pieces_in_order_are_a_snapshot() {
+    fn a_snapshot_needs_all_pieces_in_order() {
         let bytes = [7; PIECE_BYTES];
         let piece = |serial, index| Item::Piece { serial, index, bytes: &bytes };
         let last = Item::Piece { serial: 5, index: 2, bytes: &bytes[..3] };
@@ -182,7 +182,7 @@ mod tests {
             let items: Vec<_> = (0..whole.len()).filter(|&index| index != missing).map(|index| whole[index]).collect();
             assert_eq!(completed(&items), [], "{missing}");
         }
-        // What an earlier one left does not matter, nor does a count of starts in between.
+        // Pieces of an earlier snapshot and counts of starts in between are ignored.
         let starts = Item::Starts { serial: 5, starts: 1 };
         let after_a_cut = [piece(4, 0), piece(4, 1), starts, piece(5, 0), piece(5, 1), starts, last, end];
         assert_eq!(completed(&after_a_cut), [(5, 2 * PIECE_BYTES + 3)]);

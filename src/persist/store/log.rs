@@ -1,4 +1,5 @@
-//! One half of the store as a queue of `sequential-storage`, whose futures are done as soon as they are asked: the flash blocks.
+//! One half of the store as a queue of `sequential-storage`. Its futures are ready at the first poll, because the flash
+//! blocks.
 
 use core::future::Future;
 use core::ops::Range;
@@ -45,7 +46,7 @@ impl<FLASH: NorFlash> asynchronous::NorFlash for Blocking<'_, FLASH> {
     }
 }
 
-/// The outcome of a future that does not wait.
+/// Polls a future that is ready at once.
 fn now<T>(future: impl Future<Output = T>) -> Result<T, StoreError> {
     match pin!(future).poll(&mut Context::from_waker(Waker::noop())) {
         Poll::Ready(outcome) => Ok(outcome),
@@ -57,7 +58,7 @@ pub(super) fn flash_error(error: impl NorFlashError) -> StoreError {
     StoreError::Flash(error.kind())
 }
 
-/// Whether an item found room.
+/// Whether an item had room.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Push {
     Done,
@@ -70,13 +71,13 @@ pub(super) struct Log<'a, FLASH: NorFlash> {
 }
 
 impl<'a, FLASH: NorFlash> Log<'a, FLASH> {
-    /// The unit that the queue counts in.
+    /// The word size of the queue.
     const WORD: usize = if FLASH::WRITE_SIZE > FLASH::READ_SIZE { FLASH::WRITE_SIZE } else { FLASH::READ_SIZE };
-    /// How many of the largest items fit an erasable unit, beside its two marks.
+    /// The number of largest items that fit an erasable unit beside its two marks.
     pub(super) const ITEMS_IN_UNIT: usize =
         FLASH::ERASE_SIZE.saturating_sub(2 * Self::WORD) / Self::room_of(ITEM_BYTES);
 
-    /// What an item of so many bytes takes, its header of 8 bytes included.
+    /// The size of an item in flash, its header of 8 bytes included.
     pub(super) const fn room_of(length: usize) -> usize {
         8_usize.next_multiple_of(Self::WORD) + length.next_multiple_of(Self::WORD)
     }
@@ -95,12 +96,12 @@ impl<'a, FLASH: NorFlash> Log<'a, FLASH> {
         match now(self.queue.push(bytes, false))? {
             Ok(()) => Ok(Push::Done),
             Err(sequential_storage::Error::Storage { value, .. }) => Err(flash_error(value)),
-            // Full, or in a state that only an erase mends.
+            // Full, or in a state that only an erase repairs.
             Err(_) => Ok(Push::Full),
         }
     }
 
-    /// Shows every item, the oldest first, up to one that cannot be read.
+    /// Visits every item, the oldest first, up to the first unreadable one.
     #[inline(never)]
     pub(super) fn each(&mut self, visit: &mut dyn FnMut(Item<'_>)) -> Result<(), StoreError> {
         let mut packed = Packed([0; ITEM_BYTES]);

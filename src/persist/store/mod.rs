@@ -2,7 +2,7 @@
 //!
 //! The range of flash has two halves. Snapshots are appended to one half. When it is full, the other half is erased and used
 //! next. **The half with the newest complete snapshot is never erased**, so a power cut loses at most the snapshot that was
-//! being stored, whatever state the flash is left in. Each half is a queue of the crate `sequential-storage`. A snapshot is
+//! being stored, in any state of the flash. Each half is a queue of the crate `sequential-storage`. A snapshot is
 //! split into pieces of 249 bytes; it is valid once its last piece is written.
 //!
 //! ```
@@ -75,17 +75,17 @@ pub struct Stored {
     pub length: usize,
 }
 
-/// What one half of the range holds.
+/// The contents of one half of the range.
 #[derive(Clone, Copy, Debug, Default)]
 struct Survey {
-    /// Whether it begins with a count of starts, as it does after it was erased: else an erase was cut short.
+    /// Whether it begins with a count of starts. If not, an erase was interrupted.
     is_sound: bool,
     /// The largest number in it.
     serial: u32,
-    /// The newest complete snapshot below the number that was asked for.
+    /// The newest complete snapshot below the requested number.
     newest: Option<Stored>,
     starts: u32,
-    /// The bytes that its items take.
+    /// The bytes that its items occupy.
     used: usize,
 }
 
@@ -94,19 +94,19 @@ struct Survey {
 pub struct Store<FLASH> {
     flash: FLASH,
     halves: [Range<u32>; 2],
-    /// The half to which is written, if there is one that can be.
+    /// The half that is written, if one is writable.
     current: Option<usize>,
-    /// The bytes that the items in that half take.
+    /// The bytes that the items in that half occupy.
     used: usize,
     /// The half with the newest complete snapshot.
     newest: Option<usize>,
-    /// The last number that was given.
+    /// The last serial number in use.
     serial: u32,
     starts: u32,
 }
 
 impl<FLASH: NorFlash> Store<FLASH> {
-    /// Mounts a range of flash and finds what is stored there. Erases a page that a power cut left partly erased.
+    /// Mounts a range of flash and finds the stored snapshots. Erases a page that a power cut left partly erased.
     ///
     /// # Errors
     /// [`StoreError::Range`], [`StoreError::Flash`], [`StoreError::NotReady`].
@@ -146,7 +146,7 @@ impl<FLASH: NorFlash> Store<FLASH> {
     pub fn largest(&self) -> usize {
         let [half, _] = &self.halves;
         let units = (half.end.saturating_sub(half.start) as usize).checked_div(FLASH::ERASE_SIZE).unwrap_or(0);
-        // Two pieces less for the count of starts and the end.
+        // Two pieces are reserved for the count of starts and the end mark.
         (units * Log::<FLASH>::ITEMS_IN_UNIT).saturating_sub(2) * PIECE_BYTES
     }
 
@@ -162,7 +162,7 @@ impl<FLASH: NorFlash> Store<FLASH> {
         if let Some(half) = self.current {
             match self.append(half, snapshot) {
                 Ok(true) => return Ok(()),
-                // A half that is full, or that the flash refuses: a power cut may have left words that are written in part.
+                // The half is full, or the flash refuses it: a power cut may have left partly written words.
                 Ok(false) | Err(StoreError::Flash(_)) => {}
                 Err(error) => return Err(error),
             }
@@ -306,7 +306,7 @@ impl<FLASH: NorFlash> Store<FLASH> {
         Ok(is_complete)
     }
 
-    /// Whether a snapshot reads back as it was written.
+    /// Whether a snapshot reads back unchanged.
     #[inline(never)]
     fn is_stored(&mut self, half: usize, serial: u32, snapshot: &[u8]) -> Result<bool, StoreError> {
         let mut is_same = true;
@@ -327,7 +327,7 @@ impl<FLASH: NorFlash> Store<FLASH> {
     /// Appends a snapshot to a half; returns whether it had room and reads back.
     #[inline(never)]
     fn append(&mut self, half: usize, snapshot: &[u8]) -> Result<bool, StoreError> {
-        // The ends of pages waste some more: a snapshot may turn out not to fit.
+        // Page ends waste some bytes, so a snapshot may still not fit.
         let pieces =
             snapshot.len() / PIECE_BYTES * Log::<FLASH>::room_of(item::ITEM_BYTES) + snapshot.len() % PIECE_BYTES;
         let range = self.halves.get(half).cloned().unwrap_or(0..0);
@@ -361,7 +361,7 @@ impl<FLASH: NorFlash> Store<FLASH> {
         self.log(half)?.push(item)
     }
 
-    /// Erases the half that does not have the newest snapshot, and writes there from now on.
+    /// Erases the half without the newest snapshot and makes it the written half.
     #[inline(never)]
     fn change_halves(&mut self) -> Result<usize, StoreError> {
         let stored = self.newest.or(self.current).unwrap_or(1);

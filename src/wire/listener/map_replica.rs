@@ -165,7 +165,7 @@ impl<const V: usize> MapReplica<V> {
         self.faults.get(kind as usize).copied().unwrap_or(0)
     }
 
-    /// Applies new vertex ids to everything that names a vertex. The digest is unknown until the size of the new map follows.
+    /// Applies new vertex ids to every stored vertex id. The digest is unknown until the size of the new map follows.
     fn remap(&mut self, remapped: &Remapped) {
         self.digest = None;
         self.vertices = remapped.count(self.vertices).min(V as u8);

@@ -64,7 +64,7 @@ pub enum Message {
     Location(Location),
     /// Why the filter chose its best map.
     Evidence(Evidence),
-    /// One vertex with its edges, from the repetition of the map.
+    /// One vertex with its edges, from the repeated map.
     Row(Row),
     /// The count of one kind of fault since the start.
     Fault {

@@ -80,7 +80,7 @@ mod tests {
     };
 
     #[test]
-    fn every_setting_takes_its_range_and_nothing_beyond() {
+    fn every_setting_accepts_its_range_only() {
         type Make = fn(u16) -> Setting;
         type Of = fn(&Settings) -> u16;
         let settings: [(Make, Of, u16, u16); 9] = [

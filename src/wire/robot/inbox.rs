@@ -37,7 +37,7 @@ use crate::wire::{Command, Decoder, Outcome, Reply, Request};
 #[derive(Clone, Debug)]
 pub struct Inbox {
     decoder: Decoder<Request>,
-    /// Whether a request waits, and which. A `None` is not all zero, and a `static` inbox would not lie in `.bss`.
+    /// Whether a request waits, and which. A `None` is not all zero and would move a `static` inbox out of `.bss`.
     is_waiting: bool,
     waiting: Request,
     /// Whether a request was executed, the last one, and the reply to it.

@@ -10,8 +10,8 @@ use crate::place::Place;
 use crate::wire::digest::{map_digest, row_of};
 use crate::wire::{Belief, Capacities, Evidence, Hello, List, Location, Message, Remapped, ResetCause, Row, Worst};
 
-/// Decides which messages to send. It remembers what was sent, and passes each message to a callback, which says whether
-/// the transmit queue took it. It never waits.
+/// Decides which messages to send. It remembers what was sent, and passes each message to a callback, which returns
+/// whether the transmit queue accepted it. It never waits.
 ///
 /// A change whose message was refused is sent again with the next update or with the repeated map, whichever comes first. The
 /// caller sends `Health`, `Ring`, `Velocity` and `Reply` itself. Memory: 16 bytes per vertex and about 150 bytes.
@@ -40,7 +40,7 @@ impl<const V: usize> Reporter<V> {
     /// How many pieces of the map a tick sends after [`Reporter::send_full`].
     const PIECES_PER_FULL_TICK: u8 = 4;
 
-    /// A reporter that has to be started with [`Reporter::start`].
+    /// A reporter that must be started with [`Reporter::start`].
     pub const fn new() -> Self {
         let capacities =
             Capacities { vertices: 0, hypotheses: 0, history: 0, ngram_length: 0, fingerprint_step_mm: 0, sonars: 0 };
@@ -94,8 +94,8 @@ impl<const V: usize> Reporter<V> {
         self.sends_full = true;
     }
 
-    /// Sends that every vertex is gone, before the map is cleared or replaced. [`Reporter::start`] follows, or updates and
-    /// ticks with the new map.
+    /// Announces that every vertex is removed, before the map is cleared or replaced. [`Reporter::start`] follows, or
+    /// updates and ticks with the new map.
     pub fn forget(&mut self, mut send: impl FnMut(&Message) -> Result<(), QueueFull>) {
         let vertices = self.vertices.max(self.vertices_before);
         if vertices == 0 {
@@ -122,7 +122,7 @@ impl<const V: usize> Reporter<V> {
     /// Reports one ring frame: the place, what it changed, and the next piece of the repeated map.
     ///
     /// `seen` is the result of [`Mapper::observe`]. `faults` are those of the stages outside the mapper, which are sent as
-    /// one sum with the mapper's. Every message goes to `send`, which says whether the transmit queue took it.
+    /// one sum with the mapper's. `send` receives every message and returns whether the transmit queue accepted it.
     #[inline(never)]
     pub fn report<const SONARS: usize, F: Filter<V>>(
         &mut self,
@@ -251,7 +251,7 @@ impl<const V: usize> Reporter<V> {
         }
     }
 
-    /// Sends the next piece of the repeated map, if there is anything to send; returns whether the queue took it.
+    /// Sends the next piece of the repeated map, if there is anything to send; returns whether the queue accepted it.
     fn send_piece(
         &mut self,
         map: &Map<V>,

@@ -144,7 +144,7 @@ mod tests {
     }
 
     #[test]
-    fn a_snapshot_goes_out_in_pieces_as_often_as_it_is_asked_for() {
+    fn a_snapshot_is_sent_in_chunks_any_number_of_times() {
         let mut buffer = [0; 100];
         let mut staging = Staging::new(&mut buffer);
         assert_eq!(staging.outgoing_chunk(0), Err(Refusal::NotNow));
@@ -161,7 +161,7 @@ mod tests {
     }
 
     #[test]
-    fn a_snapshot_comes_in_in_order_and_pieces_may_repeat_and_overlap() {
+    fn a_snapshot_is_received_in_order_and_chunks_may_repeat_and_overlap() {
         let snapshot: Vec<u8> = (0..100).collect();
         let mut buffer = [0; 100];
         let mut staging = Staging::new(&mut buffer);
@@ -174,7 +174,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_refused_leaves_what_was_received() {
+    fn a_refusal_preserves_the_received_bytes() {
         let snapshot = [7; 10];
         let mut buffer = [0; 16];
         let mut staging = Staging::new(&mut buffer);
@@ -194,7 +194,7 @@ mod tests {
     }
 
     #[test]
-    fn the_way_out_and_the_way_in_drop_each_other() {
+    fn sending_and_receiving_drop_each_other() {
         let mut buffer = [0; 16];
         let mut staging = Staging::new(&mut buffer);
         staging.begin(0, 0).unwrap();

@@ -88,7 +88,7 @@ impl<const V: usize, const WORDS: usize, const INDICES: usize> Consistency<V, WO
     /// Whether max over the map's walks of min over the evidence of Eq. 3 is at most `distance`.
     ///
     /// Cost: O(V · A² · WORDS) with A minimal arms a vertex, A ≤ Δ^(⌈n/2⌉−1) for a largest degree of Δ; memory: a block
-    /// of 14 arms and 6 tails a vertex, whatever A is.
+    /// of 14 arms and 6 tails a vertex, independent of A.
     pub(super) fn confirms(
         &mut self,
         map: &Map<V>,

@@ -1,7 +1,7 @@
 //! Sets of n-grams (Γ of the paper) that are read label by label: the history on line, or a table.
 //!
 //! Reading a sequence of labels ends in a set of *states*. For a history a state is a position: the next label is read at the
-//! position before or behind, because the robot may turn back anywhere. For a table a state is an n-gram in one of its two
+//! position before or after, because the robot may turn back anywhere. For a table a state is an n-gram in one of its two
 //! directions; the second half of the states is the first half reversed.
 
 use super::state_set::StateSet;

@@ -157,7 +157,7 @@ mod tests {
     }
 
     #[test]
-    fn a_full_table_says_so_and_keeps_what_it_has() {
+    fn a_full_table_reports_it_and_keeps_its_ngrams() {
         let length = NgramLength::new(2).unwrap();
         let mut table = NgramTable::<2>::new(length);
         for steps in 0..32 {
@@ -170,7 +170,7 @@ mod tests {
     }
 
     #[test]
-    fn the_history_brings_its_walks_with_turns() {
+    fn a_table_of_a_history_has_its_walks_with_turns() {
         let length = NgramLength::new(3).unwrap();
         let mut history = History::<1>::new();
         let mut table = NgramTable::<2>::new(length);
