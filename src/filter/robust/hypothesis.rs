@@ -213,9 +213,7 @@ impl<const V: usize, const T: usize> Hypothesis<V, T> {
         let number = |vertex| numbers[vertex].unwrap_or(VertexId::FIRST);
         self.path.iter_mut().take(len).for_each(|vertex| *vertex = number(*vertex));
         self.before = self.before.map(number);
-        if self.marginalised_neighbours.values().iter().any(|neighbours| !neighbours.is_empty())
-            || self.before.is_some()
-        {
+        if self.marginalised.values().iter().any(|statistics| statistics.visits > 0) {
             let (statistics, neighbours) = (self.marginalised, self.marginalised_neighbours);
             self.marginalised.fill(VertexStatistics::NONE);
             self.marginalised_neighbours.fill(VertexSet32::EMPTY);
