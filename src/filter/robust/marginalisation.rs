@@ -57,3 +57,31 @@ impl<const V: usize, const T: usize> Hypothesis<V, T> {
         self.evidence -= common;
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{Fingerprint, Observation, RobustConfig, VertexId};
+
+    #[test]
+    fn marginalised_statistics_stay_with_their_vertex_when_vertices_are_renumbered() {
+        let mut model = Model::new();
+        model.configure(&RobustConfig::DEFAULT);
+        let mut history = ObservationHistory::<8>::new();
+        let mut hypothesis = Hypothesis::<4, 8>::EMPTY;
+        hypothesis.clear();
+        hypothesis.vertices = 3;
+        // The first observation has no edge, because the second one starts a sequence.
+        for (index, (vertex, steps)) in VertexId::first(3).zip([400, 500, 600]).enumerate() {
+            let observation = Observation::new(Fingerprint::from_steps(steps).unwrap());
+            history.push(&Observation { starts_sequence: index < 2, ..observation });
+            hypothesis.set_vertex_of(index, vertex);
+        }
+        hypothesis.rebuild(&model, &history);
+        hypothesis.marginalise_oldest(&history);
+        history.drop_oldest();
+        hypothesis.rebuild(&model, &history);
+        let means: Vec<f32> = hypothesis.vertices().map(|vertex| hypothesis.statistics[vertex].mean).collect();
+        assert_eq!(means, [500.0, 600.0, 400.0]);
+    }
+}
