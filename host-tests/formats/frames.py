@@ -9,7 +9,7 @@ def cobs(data: bytes) -> bytes:
 
 
 def frame(sequence: int, payload: bytes) -> bytes:
-    body = bytes([1]) + sequence.to_bytes(2, "little") + payload
+    body = bytes([2]) + sequence.to_bytes(2, "little") + payload
     return cobs(body + zlib.crc32(body).to_bytes(4, "little"))
 
 

@@ -153,7 +153,7 @@ class Recordings(unittest.TestCase):
                 self.assertLessEqual(set(event), set(schema["properties"]) | WITHOUT_TYPE, event)
                 names.add(event["event"])
             self.assertFalse(validator.is_valid({"event": 7}))
-        self.assertLessEqual({"Hello", "Place", "Belief", "Drive", "Edge", "Fault", "Damaged"}, names)
+        self.assertLessEqual({"Hello", "Place", "Belief", "Velocity", "Edge", "Fault", "Damaged"}, names)
 
     def test_the_schema_of_events_has_one_plain_type_for_each_field_as_foxglove_wants(self) -> None:
         def check(schema: dict) -> None:
