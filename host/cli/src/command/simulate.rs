@@ -51,7 +51,9 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
                 steps.push(map_now(drive.plan(), &exploration, way.len()));
             }
         }
-        way.push(exploration.rover().position());
+        if animation.is_some() {
+            way.push(exploration.rover().position());
+        }
     }
     drop(progress);
     drive.summarise(&Summary::of(&plan, &exploration))?;
