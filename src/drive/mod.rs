@@ -153,7 +153,7 @@ impl<const V: usize, const HISTORY: usize> Drive<V, HISTORY> {
         self.local_planner.holds_place()
     }
 
-    /// Tells the drive that the robot may have been moved to another place: the exit that it took last is void.
+    /// Announces that the robot may have been moved to another place. The exit that it took last is void.
     pub fn kidnapped(&mut self) {
         self.route_planner.forget_departure();
         self.local_planner.forget_edge();

@@ -182,7 +182,7 @@ impl<const SONARS: usize> PlaceDetector<SONARS> {
         self.is_at_place
     }
 
-    /// Tells the detector that the robot has not left the place that was reported last.
+    /// Announces that the robot has not left the last reported place.
     ///
     /// Call it after each frame while the robot turns in place: the ranges then change without a departure.
     pub const fn hold_place(&mut self) {

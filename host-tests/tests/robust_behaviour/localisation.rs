@@ -167,7 +167,7 @@ fn localisation_alone_adds_no_vertex() {
 fn localisation_alone_keeps_the_map_when_its_statistics_decay() {
     let environment = six_rooms();
     let mut robot = Robot::new(&environment, Hints::default(), 1);
-    // The visits are so many that they decay with the first marginalised place.
+    // With 600 visits the statistics decay at the first marginalised place.
     let mut filter = localiser_with(&known(&environment, 600), 1);
     filter.observe(robot.step());
     let before = *filter.map();

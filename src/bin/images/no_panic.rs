@@ -1,5 +1,5 @@
-//! The no-panic proof (`src/bin/no_panic/main.rs`). On any other target than the board's it is a program that says so, so that
-//! `cargo build --all-features` works on a host.
+//! The no-panic proof (`src/bin/no_panic/main.rs`). On a host it is a program that names its board and fails, so that
+//! `cargo build --all-features` works there.
 #![cfg_attr(target_os = "none", no_std, no_main)]
 
 #[cfg(target_os = "none")]
