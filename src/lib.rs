@@ -156,9 +156,11 @@ pub use config_error::ConfigError;
 pub use fault::{FaultCounters, FaultKind};
 pub use filter::{
     Consistency, Direction, Evidence, Filter, FilterCapacities, History, Ngram, NgramError, NgramLength, NgramTable,
-    NgramsFull, Observation, PaperConfig, PaperFactors, PaperFilter, Particle, Prior, RobustConfig, RobustFactors,
-    RobustFilter, Turn, Update, WeightFactors, WorstNgram,
+    NgramsFull, Observation, OrderedConfig, OrderedFilter, OrderedObservation, PaperConfig, PaperFactors, PaperFilter,
+    Particle, Prior, RobustConfig, RobustFactors, RobustFilter, Turn, Update, WaysError, WaysSeen, WeightFactors,
+    WorstNgram,
 };
+pub use map::darts::{Bearing, DartMap, WAYS};
 pub use map::{Map, PerVertex, VertexId, VertexSet, VerticesFull};
 pub use mapper::{Mapper, MapperConfig};
 pub use place::{Fingerprint, FingerprintError};

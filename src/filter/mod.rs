@@ -2,11 +2,13 @@
 
 mod interface;
 mod observation;
+mod ordered;
 mod paper;
 pub(crate) mod robust;
 
 pub use interface::{Filter, FilterCapacities};
 pub use observation::{Observation, Turn};
+pub use ordered::{OrderedConfig, OrderedFilter, OrderedObservation, WaysError, WaysSeen};
 pub use paper::{
     Consistency, Direction, Evidence, History, Ngram, NgramError, NgramLength, NgramTable, NgramsFull, PaperConfig,
     PaperFilter, Particle, Prior,

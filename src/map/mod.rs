@@ -1,5 +1,6 @@
 //! The topological map: a labelled graph of places and the connections between them (Section II of the paper).
 
+pub(crate) mod darts;
 mod per_vertex;
 mod vertex;
 mod vertex_set;

@@ -3,7 +3,7 @@
 use super::{
     environment::{Environment, Place},
     graph::Graph,
-    planar::draw_planar,
+    planar::{Point, draw_planar},
     walk::{PathRng, path_rng},
 };
 use rand::{RngExt, seq::SliceRandom};
@@ -173,12 +173,17 @@ impl Family {
     /// # Errors
     /// [`FamilyError::NoneFound`] when none of 1000 graphs had a valid assignment of categories.
     pub fn environment(&self, index: usize) -> Result<Environment, FamilyError> {
+        self.with_points(index).map(|(environment, _)| environment)
+    }
+
+    /// As [`Family::environment`], with where the places lie in the plane.
+    pub(super) fn with_points(&self, index: usize) -> Result<(Environment, Vec<Point>), FamilyError> {
         let mut rng = path_rng(self.seed, index as u64);
         for _ in 0..GRAPHS {
             let places = rng.random_range(self.places.clone());
             let edges = (rng.random_range(self.degree.clone()) * places as f64 / 2.0).round();
             let labels = rng.random_range(self.labels.clone()).min(places);
-            let graph = draw_planar(places, edges as usize, &mut rng);
+            let (graph, points) = draw_planar(places, edges as usize, &mut rng);
             let Some(categories) = self.draw_categories(&graph, labels, &mut rng) else { continue };
             let means_mm = draw_means_mm(labels, &mut rng);
             let place = |(id, &category): (u32, &usize)| {
@@ -188,7 +193,7 @@ impl Family {
             let places = (0..).zip(&categories).map(place).collect();
             let edges: Vec<_> = graph.edges().iter().map(|&(a, b)| [a as u32, b as u32]).collect();
             let environment = Environment::new(format!("{self} number {index}"), places, &edges);
-            return environment.map_err(|_| FamilyError::NoneFound);
+            return environment.map(|environment| (environment, points)).map_err(|_| FamilyError::NoneFound);
         }
         Err(FamilyError::NoneFound)
     }

@@ -23,6 +23,7 @@ pub mod hints;
 pub mod judge;
 pub mod laps;
 pub mod mapping;
+pub mod ordered;
 pub mod parallel;
 mod planar;
 pub mod prior;

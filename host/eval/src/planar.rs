@@ -6,14 +6,15 @@ use rand::RngExt;
 /// Largest degree of a vertex for edges beyond the tree: the largest degree of an observation.
 const MAX_DEGREE: usize = 7;
 
-type Point = (f64, f64);
+/// A point of the unit square.
+pub(super) type Point = (f64, f64);
 
 /// Draws a connected planar graph with straight edges between random points of the unit square.
 ///
 /// It holds the minimum spanning tree of the points, and then the shortest edges that cross no earlier edge, until
 /// there are `edges`. It is a tree when `edges` is below the size of the tree, and a triangulation when more `edges` are
-/// requested than fit.
-pub(super) fn draw_planar(vertices: usize, edges: usize, rng: &mut PathRng) -> Graph {
+/// requested than fit. The points are the positions of the vertices.
+pub(super) fn draw_planar(vertices: usize, edges: usize, rng: &mut PathRng) -> (Graph, Vec<Point>) {
     let points: Vec<Point> = (0..vertices).map(|_| (rng.random(), rng.random())).collect();
     let mut pairs: Vec<(usize, usize)> = (0..vertices).flat_map(|a| (a + 1..vertices).map(move |b| (a, b))).collect();
     pairs.sort_by(|&left, &right| length(&points, left).total_cmp(&length(&points, right)));
@@ -36,7 +37,7 @@ pub(super) fn draw_planar(vertices: usize, edges: usize, rng: &mut PathRng) -> G
             degrees[b] += 1;
         }
     }
-    graph
+    (graph, points)
 }
 
 fn length(points: &[Point], (a, b): (usize, usize)) -> f64 {
@@ -77,7 +78,7 @@ mod tests {
         let mut rng = path_rng(5, 0);
         for (vertices, edges, drawn) in [(12, 15, 15..=15), (12, 3, 11..=11), (12, 99, 20..=30)] {
             for _ in 0..20 {
-                let graph = draw_planar(vertices, edges, &mut rng);
+                let (graph, _) = draw_planar(vertices, edges, &mut rng);
                 assert!(drawn.contains(&graph.edges().len()), "{} of {edges}", graph.edges().len());
                 assert!(graph.is_connected());
             }

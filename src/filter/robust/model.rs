@@ -78,13 +78,18 @@ impl Model {
     /// −ln R − (n−1)/2 ln 2π − ½ ln n + ln Γ(a + (n−1)/2) − ln Γ(a) + a ln b − (a + (n−1)/2) ln(b + Q/2)
     /// ```
     pub(crate) fn label_evidence(&self, vertex: &VertexStatistics) -> f32 {
-        if vertex.visits == 0 {
+        self.evidence_of_labels(vertex.visits, vertex.scatter)
+    }
+
+    /// As [`Model::label_evidence`], from the number of labels and their scatter.
+    pub(crate) fn evidence_of_labels(&self, visits: u16, scatter: f32) -> f32 {
+        if visits == 0 {
             return 0.0;
         }
-        let visits = f32::from(vertex.visits);
+        let visits = f32::from(visits);
         let shape = SHAPE + 0.5 * (visits - 1.0);
         self.label_constant - visits * HALF_LN_2_PI - 0.5 * libm::logf(visits) + ln_gamma(shape)
-            - shape * libm::logf(self.scale + 0.5 * vertex.scatter)
+            - shape * libm::logf(self.scale + 0.5 * scatter)
     }
 
     /// The evidence of the transitions out of a vertex and of the degrees observed there. A transition takes each of the d

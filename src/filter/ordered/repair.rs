@@ -1,0 +1,246 @@
+//! Refinement between two places: a repair builds a hypothesis again, in steps of bounded work.
+//!
+//! A repair starts from one of the hypotheses, its source, and builds a draft from the record. The draft follows the path of the
+//! source until it has to leave it: at a decision that is forbidden, at a place from which on all is decided again, or where the
+//! source, two vertices of which were folded onto each other, contradicts itself. From there on decisions look ahead, until the
+//! draft is where the source is. A draft that is better than the worst hypothesis becomes one.
+
+use super::OrderedFilter;
+use super::fold::{fit, fold};
+use super::replay::Builder;
+use crate::filter::draws;
+use crate::map::darts::NONE;
+use rand_core::Rng;
+use rand_xoshiro::Xoshiro128PlusPlus;
+
+/// Vertices are not considered for a fold when labels and ways speak against it by more than this, in nats.
+const UNFIT: f32 = -14.0;
+
+/// How many folds are looked at before one is made.
+const FOLDS: usize = 8;
+
+/// The work of one step: one unit follows the source by a place.
+const WORK: u32 = 300;
+
+/// The work of one decision.
+const DECISION: u32 = 12;
+
+/// Of 16 repairs so many start from the best hypothesis in any case, so many fold two vertices, and of the others so many decide
+/// all again.
+const BEST: usize = 4;
+const FOLDED: usize = 6;
+const RESTARTS: usize = 2;
+/// And so many start elsewhere on the map.
+const RELOCATED: usize = 4;
+
+/// The noise of decisions is drawn up to this, in nats.
+const TEMPERATURE: f32 = 3.0;
+
+/// The noise of the choice of a fold, in nats.
+const FOLD_TEMPERATURE: f32 = 3.0;
+
+/// Where a repair leaves the path of its source.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Stray {
+    /// Only where the source contradicts itself.
+    Never,
+    /// At the decision with this number.
+    AtDecision(usize),
+    /// From an observation on, for good.
+    From(usize),
+}
+
+/// How far a repair has got.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Repair {
+    /// The next observation; `None` when no repair is under way.
+    next: Option<usize>,
+    stray: Stray,
+    /// Whether the draft is where the source is.
+    follows: bool,
+    /// Noise of the decisions.
+    temperature: f32,
+}
+
+impl Repair {
+    pub(super) const NONE: Self = Self { next: None, stray: Stray::Never, follows: false, temperature: 0.0 };
+}
+
+impl<const N: usize, const V: usize, const D: usize, const T: usize> OrderedFilter<N, V, D, T> {
+    /// Runs one refinement step: a repair, or a part of one that is too long for a step. The next [`OrderedFilter::observe`]
+    /// takes what comes out.
+    ///
+    /// Cost: at most `WORK` places or `WORK / DECISION` decisions; the choice of a fold is O(V² + D²).
+    pub fn refine(&mut self) {
+        if self.record.len() < 3 {
+            return;
+        }
+        let piece = u64::from(self.observed) << 16 | u64::from(self.refined);
+        self.refined += 1;
+        let mut random = draws(self.seed, piece);
+        if self.repair.next.is_none() && !self.start_repair(&mut random) {
+            return;
+        }
+        if self.continue_repair(&mut random) {
+            self.repair.next = None;
+            if self.draft.score() > self.beam.threshold() {
+                self.beam.insert(&self.draft);
+            }
+        }
+    }
+
+    /// Chooses a source and where to leave its path; tells whether there is something to repair.
+    fn start_repair(&mut self, random: &mut Xoshiro128PlusPlus) -> bool {
+        let rank = if below(random, 16) < BEST { 0 } else { below(random, self.beam.len()) };
+        let Some(source) = self.beam.get(rank) else { return false };
+        self.source.clone_from(source);
+        let stray = if below(random, 16) < FOLDED {
+            if !self.fold_two(random, rank) {
+                return false;
+            }
+            Stray::Never
+        } else if below(random, 16) < RELOCATED {
+            let from = below(random, 2) * below(random, self.record.len());
+            let builder = Builder { model: &self.model, record: &self.record, translation: &mut self.translation };
+            if !builder.relocate(&mut self.source, from, || FOLD_TEMPERATURE * gumbel(random)) {
+                return false;
+            }
+            Stray::Never
+        } else if below(random, 16) < RESTARTS {
+            Stray::From(1)
+        } else if below(random, 4) > 0 {
+            // Some more than there are edges: exits that were doubted, and places that fit badly.
+            Stray::AtDecision(below(random, self.source.map.edges().count() + 3))
+        } else {
+            Stray::From(1 + below(random, self.record.len() - 1))
+        };
+        let temperature = if stray == Stray::Never { 0.0 } else { TEMPERATURE * uniform(random) };
+        self.repair = Repair { next: Some(0), stray, follows: true, temperature };
+        self.start_draft();
+        true
+    }
+
+    /// Builds on the draft; tells whether it explains the whole record.
+    fn continue_repair(&mut self, random: &mut Xoshiro128PlusPlus) -> bool {
+        let Some(mut index) = self.repair.next else { return false };
+        let mut builder = Builder { model: &self.model, record: &self.record, translation: &mut self.translation };
+        let mut work = 0;
+        while index < self.record.len() && work < WORK {
+            let mut forbidden = None;
+            if let Stray::From(from) = self.repair.stray {
+                self.repair.follows &= index < from;
+            }
+            if self.repair.follows
+                && let Some(step) = builder.step(&self.source, &mut self.draft, index)
+            {
+                work += 1;
+                match &mut self.repair.stray {
+                    Stray::AtDecision(0) if step.is_decision => {
+                        forbidden = Some(step.choice);
+                        self.repair.stray = Stray::Never;
+                    }
+                    Stray::AtDecision(left) if step.is_decision => *left -= 1,
+                    _ => {}
+                }
+                if forbidden.is_none() {
+                    builder.take(&self.source, &mut self.draft, index, step);
+                    index += 1;
+                    continue;
+                }
+            }
+            let temperature = self.repair.temperature;
+            let noise = || temperature * gumbel(random);
+            let Some((target, followed)) = builder.decide(&mut self.draft, index, forbidden, noise) else {
+                // Nothing else explains the place, or there is no room for what does.
+                self.repair.next = None;
+                return false;
+            };
+            work += if followed { 1 } else { DECISION };
+            self.repair.follows = builder.is_back(&self.source, &mut self.draft, index, target);
+            index += 1;
+        }
+        self.repair.next = Some(index);
+        index == self.record.len()
+    }
+
+    /// The draft as it was before the record begins.
+    fn start_draft(&mut self) {
+        self.draft.clone_from(&self.base);
+        self.translation.start(self.base.map.vertices(), self.base.map.darts());
+    }
+
+    /// Builds the draft strictly along the path of the source, from one observation, the first for a new draft, to before another;
+    /// `None` when it contradicts itself.
+    pub(super) fn rebuild(&mut self, from: usize, until: usize) -> Option<()> {
+        if from == 0 {
+            self.start_draft();
+        }
+        let mut builder = Builder { model: &self.model, record: &self.record, translation: &mut self.translation };
+        (from..until).try_for_each(|index| builder.follow(&self.source, &mut self.draft, index))
+    }
+
+    /// Folds two vertices of the source, the hypothesis of a rank; tells whether there were two that fit.
+    ///
+    /// Pairs are drawn by how well they fit, then one of them by what follows from it.
+    fn fold_two(&mut self, random: &mut Xoshiro128PlusPlus, rank: usize) -> bool {
+        let mut drawn = [(f32::NEG_INFINITY, NONE, NONE); FOLDS];
+        let source = &self.source;
+        for u in 1..source.map.vertices() {
+            for v in 0..u {
+                let (label, other) = (source.label(u), source.label(v));
+                if source.is_label_far(&self.model, label.mean, v) {
+                    continue;
+                }
+                let labels = label.with(&other).evidence(&self.model)
+                    - label.evidence(&self.model)
+                    - other.evidence(&self.model);
+                for &a in source.map.ways(u) {
+                    for &b in source.map.ways(v) {
+                        let fit = labels + fit(&self.model, source, (a, b));
+                        if fit > UNFIT {
+                            rank_in(&mut drawn, (fit + FOLD_TEMPERATURE * gumbel(random), a, b));
+                        }
+                    }
+                }
+            }
+        }
+        let len = self.record.len();
+        let mut chosen = (f32::NEG_INFINITY, NONE, NONE);
+        for &(_, a, b) in drawn.iter().take_while(|(score, ..)| *score > f32::NEG_INFINITY) {
+            if let Some(gain) = fold(&self.model, &mut self.source, &mut self.union, (a, b), len) {
+                let score = gain + FOLD_TEMPERATURE * gumbel(random);
+                if score > chosen.0 {
+                    chosen = (score, a, b);
+                }
+            }
+            if let Some(source) = self.beam.get(rank) {
+                self.source.clone_from(source);
+            }
+        }
+        let (_, a, b) = chosen;
+        a != NONE && fold(&self.model, &mut self.source, &mut self.union, (a, b), len).is_some()
+    }
+}
+
+/// Puts a pair among the best ones.
+fn rank_in<const K: usize>(ranked: &mut [(f32, u8, u8); K], mut pair: (f32, u8, u8)) {
+    for slot in ranked {
+        if pair.0 > slot.0 {
+            core::mem::swap(slot, &mut pair);
+        }
+    }
+}
+
+/// A random number below a bound; 0 when the bound is 0.
+fn below(random: &mut Xoshiro128PlusPlus, bound: usize) -> usize {
+    ((u64::from(random.next_u32()) * bound as u64) >> 32) as usize
+}
+
+fn uniform(random: &mut Xoshiro128PlusPlus) -> f32 {
+    ((random.next_u32() >> 8) as f32 + 0.5) / (1 << 24) as f32
+}
+
+/// Noise that makes the largest of perturbed logarithms a draw.
+fn gumbel(random: &mut Xoshiro128PlusPlus) -> f32 {
+    -libm::logf(-libm::logf(uniform(random)))
+}

@@ -1,0 +1,406 @@
+//! Building a map again from the record: along a given path, or by decisions that look ahead.
+
+use super::hypothesis::{Choice, Gain, Hypothesis, Target};
+use super::model::{Model, SAME_WAY};
+use super::record::Record;
+use crate::map::darts::NONE;
+
+/// A visit that gains so much less than one that is explained rightly calls for a decision, in nats.
+const SURPRISE: f32 = -6.0;
+
+/// What one place of a rollout can cost at most: about what an explanation by a wrong exit costs, in nats.
+const ROLLOUT_WORST: f32 = -9.0;
+
+/// A place of a rollout that gains so much less calls for another exit than the one that was told, in nats.
+const DOUBT: f32 = -4.0;
+
+/// Exits that cost more than this are not considered, in nats.
+const WORST_EXIT: f32 = -8.0;
+
+/// How many places a rollout looks ahead.
+const LOOKAHEAD: usize = 10;
+
+/// What a rollout loses that ends at a way that nobody has driven, in nats: another decision is due there.
+const OPEN: f32 = 3.0;
+
+/// How many choices are followed ahead.
+const FOLLOWED: usize = 8;
+
+/// Which vertex and dart of the map that is built stands for each of another map.
+#[derive(Clone, Debug)]
+pub(super) struct Translation<const V: usize, const D: usize> {
+    vertex: [u8; V],
+    dart: [u8; D],
+    is_image: [bool; D],
+}
+
+impl<const V: usize, const D: usize> Translation<V, D> {
+    pub(super) const fn new() -> Self {
+        Self { vertex: [NONE; V], dart: [NONE; D], is_image: [false; D] }
+    }
+
+    /// Starts with the first vertices and darts, which are the same in both maps.
+    pub(super) fn start(&mut self, vertices: u8, darts: u8) {
+        self.vertex.fill(NONE);
+        self.dart.fill(NONE);
+        self.is_image.fill(false);
+        (0..vertices).zip(&mut self.vertex).for_each(|(vertex, image)| *image = vertex);
+        (0..darts).zip(self.dart.iter_mut().zip(&mut self.is_image)).for_each(|(dart, (image, is_image))| {
+            *image = dart;
+            *is_image = true;
+        });
+    }
+
+    fn vertex(&self, vertex: u8) -> Option<u8> {
+        self.vertex.get(usize::from(vertex)).copied().filter(|&vertex| vertex != NONE)
+    }
+
+    fn set(&mut self, dart: u8, image: u8) {
+        if let (Some(slot), Some(is_image)) =
+            (self.dart.get_mut(usize::from(dart)), self.is_image.get_mut(usize::from(image)))
+        {
+            *slot = image;
+            *is_image = true;
+        }
+    }
+
+    /// The image of a dart whose vertex has one. It is found by its bearing: vertices keep their frames.
+    fn image<const T: usize>(
+        &mut self,
+        from: &Hypothesis<V, D, T>,
+        to: &mut Hypothesis<V, D, T>,
+        dart: u8,
+    ) -> Option<u8> {
+        let known = self.dart.get(usize::from(dart)).copied()?;
+        if known != NONE {
+            return Some(known);
+        }
+        let vertex = self.vertex(from.map.vertex(dart))?;
+        let mine = from.map.vertex(dart);
+        // The frames drift apart as bearings are averaged: what is known of the other ways says how far.
+        let (mut sum, mut count) = (0_i32, 0_i32);
+        for &way in from.map.ways(mine) {
+            if let Some(&image) = self.dart.get(usize::from(way)).filter(|&&image| image != NONE) {
+                sum += i32::from(to.map.bearing(image).wrapping_sub(from.map.bearing(way)) as i16);
+                count += 1;
+            }
+        }
+        let drift = (sum / count.max(1)) as i16;
+        let bearing = from.map.bearing(dart).wrapping_add_signed(drift);
+        let mut best = (None, SAME_WAY + 1);
+        for &way in to.map.ways(vertex) {
+            let off = |bearing: u16| (bearing.wrapping_sub(to.map.bearing(way)) as i16).unsigned_abs();
+            if off(bearing) >= best.1 || self.is_image.get(usize::from(way)) != Some(&false) {
+                continue;
+            }
+            // Another dart without an image may be closer.
+            let closer = |&other: &u8| {
+                self.dart.get(usize::from(other)) == Some(&NONE)
+                    && from.map.vertex(other) == mine
+                    && off(from.map.bearing(other).wrapping_add_signed(drift)) < off(bearing)
+            };
+            if !from.map.ways(mine).iter().any(closer) {
+                best = (Some(way), off(bearing));
+            }
+        }
+        let image = best.0.or_else(|| to.map.add_way(vertex, bearing))?;
+        self.set(dart, image);
+        Some(image)
+    }
+}
+
+/// How a hypothesis explains one observation.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Step {
+    pub(super) choice: Choice,
+    pub(super) gain: Gain,
+    /// Whether it is not what known ways say, or fits badly.
+    pub(super) is_decision: bool,
+}
+
+/// What building works with.
+pub(super) struct Builder<'a, const V: usize, const D: usize, const T: usize> {
+    pub(super) model: &'a Model,
+    pub(super) record: &'a Record<T>,
+    pub(super) translation: &'a mut Translation<V, D>,
+}
+
+impl<const V: usize, const D: usize, const T: usize> Builder<'_, V, D, T> {
+    /// Extends `to` by observation `index` as `from` explains it; `None` when that contradicts the map so far.
+    pub(super) fn follow(
+        &mut self,
+        from: &Hypothesis<V, D, T>,
+        to: &mut Hypothesis<V, D, T>,
+        index: usize,
+    ) -> Option<()> {
+        let step = self.step(from, to, index)?;
+        self.take(from, to, index, step);
+        Some(())
+    }
+
+    /// How `from` explains observation `index`, as a choice of `to` with what it gains.
+    pub(super) fn step(
+        &mut self,
+        from: &Hypothesis<V, D, T>,
+        to: &mut Hypothesis<V, D, T>,
+        index: usize,
+    ) -> Option<Step> {
+        let choice = self.translated(from, to, index).filter(|&choice| to.has_room(choice))?;
+        let entry = self.record.get(index);
+        let told = if choice.exit == NONE { None } else { to.told_way(self.record, index, to.at) };
+        let gain = to.gain(self.model, &entry, told, choice);
+        let par = self.model.par(entry.ways.count(), entry.ln_travel > 0) + SURPRISE;
+        let is_expected = choice.target == Target::Known && told == Some(choice.exit) && gain.total() > par - 1.0;
+        Some(Step { choice, gain, is_decision: !is_expected && index > 0 })
+    }
+
+    /// Extends `to` by a step of `from`.
+    pub(super) fn take(&mut self, from: &Hypothesis<V, D, T>, to: &mut Hypothesis<V, D, T>, index: usize, step: Step) {
+        let came_by = from.came_by(index);
+        to.extend(&self.record.get(index), index, step.choice, step.gain, from.map.bearing(came_by));
+        if step.choice.target == Target::New {
+            let vertex = from.map.vertex(came_by);
+            if let Some(slot) = self.translation.vertex.get_mut(usize::from(vertex)) {
+                *slot = to.map.vertex(to.at);
+            }
+            self.translation.set(came_by, to.at);
+        }
+    }
+
+    /// How `from` explains observation `index`, as a choice of `to`.
+    fn translated(&mut self, from: &Hypothesis<V, D, T>, to: &mut Hypothesis<V, D, T>, index: usize) -> Option<Choice> {
+        let came_by = from.came_by(index);
+        if came_by == NONE {
+            return None;
+        }
+        let exit = if self.record.get(index).starts() || to.at == NONE {
+            NONE
+        } else {
+            let exit = from.map.partner(came_by)?;
+            let exit = self.translation.image(from, to, exit)?;
+            if to.map.vertex(exit) != to.map.vertex(to.at) {
+                return None;
+            }
+            exit
+        };
+        if self.translation.vertex(from.map.vertex(came_by)).is_none() {
+            let is_open = exit == NONE || to.map.partner(exit).is_none();
+            return is_open.then_some(Choice { exit, target: Target::New });
+        }
+        let image = self.translation.image(from, to, came_by)?;
+        let target = match (exit, to.map.partner(exit)) {
+            (NONE, _) => Target::At(image),
+            (_, Some(partner)) if partner == image => Target::Known,
+            (_, None) if to.map.partner(image).is_none() && image != exit => Target::At(image),
+            _ => return None,
+        };
+        Some(Choice { exit, target })
+    }
+
+    /// Extends a hypothesis by observation `index` with the choice that explains it and what follows best, but not with a
+    /// forbidden one; `noise` is added to each choice. Where it got to, and whether it just followed a known way; `None` when
+    /// there is no choice.
+    pub(super) fn decide(
+        &mut self,
+        to: &mut Hypothesis<V, D, T>,
+        index: usize,
+        forbidden: Option<Choice>,
+        mut noise: impl FnMut() -> f32,
+    ) -> Option<(Target, bool)> {
+        let entry = self.record.get(index);
+        let par = self.model.par(entry.ways.count(), entry.ln_travel > 0);
+        if to.at != NONE
+            && !entry.starts()
+            && let Some(told) = to.told_way(self.record, index, to.at)
+            && to.map.partner(told).is_some()
+        {
+            let choice = Choice { exit: told, target: Target::Known };
+            let gain = to.gain(self.model, &entry, Some(told), choice);
+            let ways = self.model.ln_of(to.map.ways(to.map.vertex(to.at)).len());
+            if gain.total() > par + SURPRISE - ways && forbidden != Some(choice) {
+                to.extend(&entry, index, choice, gain, 0);
+                return Some((choice.target, true));
+            }
+        }
+        let nothing = (f32::NEG_INFINITY, Choice { exit: NONE, target: Target::Known }, Gain::default());
+        let mut best = [nothing; FOLLOWED];
+        to.propose(self.model, self.record, index, WORST_EXIT, |choice, gain| {
+            if forbidden == Some(choice) || !to.has_room(choice) {
+                return;
+            }
+            let mut moved = (gain.total(), choice, gain);
+            for slot in &mut best {
+                if moved.0 > slot.0 {
+                    core::mem::swap(slot, &mut moved);
+                }
+            }
+        });
+        let mut chosen = nothing;
+        for &(score, choice, gain) in best.iter().filter(|(score, ..)| *score > f32::NEG_INFINITY) {
+            let total = score + self.rollout(to, index, choice) + noise();
+            if total > chosen.0 {
+                chosen = (total, choice, gain);
+            }
+        }
+        let (total, choice, gain) = chosen;
+        if total == f32::NEG_INFINITY {
+            return None;
+        }
+        to.extend(&entry, index, choice, gain, 0);
+        Some((choice.target, false))
+    }
+
+    /// Whether `to` is where `from` is at observation `index`, after a decision. A new vertex is taken for the one that `from`
+    /// came to then for the first time.
+    pub(super) fn is_back(
+        &mut self,
+        from: &Hypothesis<V, D, T>,
+        to: &mut Hypothesis<V, D, T>,
+        index: usize,
+        target: Target,
+    ) -> bool {
+        let came_by = from.came_by(index);
+        if came_by == NONE {
+            return false;
+        }
+        let vertex = from.map.vertex(came_by);
+        match (self.translation.vertex(vertex), target) {
+            (Some(_), _) => self.translation.image(from, to, came_by) == Some(to.at),
+            (None, Target::New) => {
+                if let Some(slot) = self.translation.vertex.get_mut(usize::from(vertex)) {
+                    *slot = to.map.vertex(to.at);
+                }
+                to.map.turn_vertex(to.map.vertex(to.at), from.map.bearing(came_by).wrapping_sub(to.map.bearing(to.at)));
+                self.translation.set(came_by, to.at);
+                true
+            }
+            (None, _) => false,
+        }
+    }
+
+    /// What the places after observation `index` gain, compared with what they gain when they are explained rightly, as far as
+    /// known ways lead.
+    fn rollout(&self, on: &mut Hypothesis<V, D, T>, index: usize, choice: Choice) -> f32 {
+        match choice.target {
+            Target::Known => self.follow_known(on, index, on.map.partner(choice.exit).unwrap_or(NONE)),
+            Target::At(dart) if choice.exit == NONE => self.follow_known(on, index, dart),
+            Target::At(dart) => {
+                on.map.join(choice.exit, dart);
+                let gain = self.follow_known(on, index, dart);
+                on.map.part(dart);
+                gain
+            }
+            // From a new vertex the only known way leads back.
+            Target::New if choice.exit != NONE && self.record.exit_bearing(index + 1) == Some(0) => {
+                self.arrive(on, index + 1, choice.exit) + self.follow_known(on, index + 1, choice.exit)
+            }
+            Target::New => -OPEN,
+        }
+    }
+
+    fn arrive(&self, on: &Hypothesis<V, D, T>, index: usize, at: u8) -> f32 {
+        let entry = self.record.get(index);
+        let par = self.model.par(entry.ways.count(), false);
+        (on.arrival(self.model, &entry, at).total() - par).max(ROLLOUT_WORST)
+    }
+
+    fn follow_known(&self, on: &Hypothesis<V, D, T>, index: usize, mut at: u8) -> f32 {
+        let mut sum = 0.0;
+        let last = (index + LOOKAHEAD).min(self.record.len().saturating_sub(1));
+        for next in index + 1..=last {
+            if self.record.get(next).starts() {
+                break;
+            }
+            let (gain, partner) = self.known_step(on, next, at);
+            sum += gain.max(ROLLOUT_WORST);
+            if gain < ROLLOUT_WORST || partner == NONE {
+                break;
+            }
+            at = partner;
+        }
+        sum
+    }
+
+    /// Where the robot got to at observation `index` by a known way, having come to the place before by `at`, and what that gains
+    /// compared with a place that is explained rightly; [`NONE`] where nobody has driven.
+    fn known_step(&self, on: &Hypothesis<V, D, T>, index: usize, at: u8) -> (f32, u8) {
+        let entry = self.record.get(index);
+        let told = on.told_way(self.record, index, at);
+        let par = self.model.par(entry.ways.count(), entry.ln_travel > 0);
+        let gain = |partner: u8| {
+            on.arrival(self.model, &entry, partner).total() + self.model.travel(on.map.travel(partner), entry.ln_travel)
+                - par
+        };
+        let mut best = (f32::NEG_INFINITY, NONE);
+        if let Some(told) = told {
+            let Some(partner) = on.map.partner(told) else { return (-OPEN, NONE) };
+            best = (gain(partner), partner);
+        }
+        if best.0 < DOUBT {
+            // Another exit than the one that was told, or any when none was.
+            let ways = on.map.ways(on.map.vertex(at));
+            let cost = match told {
+                Some(_) => self.model.exit(Some(false), ways.len()) + self.model.ln_of(ways.len()),
+                None => 0.0,
+            };
+            for &exit in ways.iter().filter(|&&exit| told != Some(exit)) {
+                let other = match on.map.partner(exit) {
+                    Some(partner) => (cost + gain(partner), partner),
+                    // It may have led anywhere.
+                    None if told.is_none() => (-OPEN, NONE),
+                    None => continue,
+                };
+                if other.0 > best.0 {
+                    best = other;
+                }
+            }
+        }
+        best
+    }
+
+    /// Draws another way by which the robot may have come to place `from`, and lets the path follow known ways from there
+    /// until it is where it was, or none leads on. The map stays as it is. `false` when no way fits.
+    pub(super) fn relocate(&self, on: &mut Hypothesis<V, D, T>, from: usize, mut noise: impl FnMut() -> f32) -> bool {
+        let first = self.record.get(from);
+        let mut best = (f32::NEG_INFINITY, NONE);
+        for dart in 0..on.map.darts() {
+            if dart != on.came_by(from) && !on.is_far(self.model, first.steps, on.map.vertex(dart)) {
+                let gain = self.arrive(on, from, dart) + self.follow_known(on, from, dart) + noise();
+                if gain > best.0 {
+                    best = (gain, dart);
+                }
+            }
+        }
+        let mut at = best.1;
+        if at == NONE {
+            return false;
+        }
+        let mut reached = 0_u64;
+        let mut index = from;
+        while index < self.record.len() {
+            set(&mut on.path, index, at);
+            reached |= 1 << (on.map.vertex(at) & 63);
+            index += 1;
+            let (gain, partner) = self.known_step(on, index, at);
+            if on.came_by(index) == partner {
+                return true;
+            }
+            if gain < ROLLOUT_WORST || partner == NONE {
+                break;
+            }
+            at = partner;
+        }
+        // What follows is open until the path is among vertices that were reached.
+        while index < self.record.len() && reached >> (on.map.vertex(on.came_by(index)) & 63) & 1 == 0 {
+            set(&mut on.path, index, NONE);
+            index += 1;
+        }
+        true
+    }
+}
+
+fn set(path: &mut [u8], index: usize, dart: u8) {
+    if let Some(slot) = path.get_mut(index) {
+        *slot = dart;
+    }
+}

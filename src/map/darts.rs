@@ -1,0 +1,470 @@
+//! The edge-ordered map: at each vertex the ways in counter-clockwise order, and which two of them an edge joins.
+//!
+//! One way of one vertex is a *dart*. The partner of a dart is the other end of its edge; a dart without partner is a
+//! *frontier*, a way that nobody has driven. A *face* is the orbit of "follow the edge, take the next way counter-clockwise";
+//! frontiers are left out. For a connected map of V vertices, E edges and F faces, V − E + F = 2 − 2 · genus (Euler), and a map
+//! that can be drawn in the plane has genus 0.
+
+/// The most ways of a vertex.
+pub const WAYS: usize = 7;
+
+/// No dart, or no vertex.
+pub(crate) const NONE: u8 = u8::MAX;
+
+/// A bearing as a binary angle, counter-clockwise: 2¹⁶ is a full turn, so that differences wrap around by themselves.
+pub type Bearing = u16;
+
+/// One way of one vertex: 8 bytes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+struct Dart {
+    vertex: u8,
+    partner: u8,
+    /// In the frame of its vertex.
+    bearing: Bearing,
+    /// At how many visits the way was seen or driven.
+    seen: u8,
+    /// How many passages of the edge have a travel time. Held by the end with the smaller number.
+    timed: u8,
+    /// Mean of ln(travel time in ring frames) in units of 2⁻¹². Held as `timed`.
+    ln_travel: u16,
+}
+
+impl Dart {
+    const NONE: Self = Self { vertex: NONE, partner: NONE, bearing: 0, seen: 0, timed: 0, ln_travel: 0 };
+}
+
+/// The darts of a vertex in counter-clockwise order.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+struct Ways {
+    count: u8,
+    darts: [u8; WAYS],
+}
+
+impl Ways {
+    const NONE: Self = Self { count: 0, darts: [NONE; WAYS] };
+}
+
+/// An edge-ordered map of at most `V` vertices (`V` ≤ 64) and `D` darts (`D` ≤ 254); vertices and darts are numbered from 0
+/// in the order in which they were added. Loops and parallel edges are ordinary edges.
+///
+/// Memory: 8 bytes a vertex and 8 bytes a dart.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct DartMap<const V: usize, const D: usize> {
+    vertices: u8,
+    darts: u8,
+    ways: [Ways; V],
+    dart: [Dart; D],
+}
+
+impl<const V: usize, const D: usize> DartMap<V, D> {
+    /// The map without any vertex.
+    pub const EMPTY: Self = {
+        assert!(V >= 1 && V <= 64, "a map holds 1 to 64 vertices");
+        assert!(D >= 2 && D <= 254, "a map holds 2 to 254 darts");
+        Self { vertices: 0, darts: 0, ways: [Ways::NONE; V], dart: [Dart::NONE; D] }
+    };
+
+    /// Removes all vertices and darts. Cost: O(V).
+    pub fn clear(&mut self) {
+        self.vertices = 0;
+        self.darts = 0;
+        self.ways.fill(Ways::NONE);
+    }
+
+    /// How many vertices the map has.
+    pub const fn vertices(&self) -> u8 {
+        self.vertices
+    }
+
+    /// How many darts the map has.
+    pub const fn darts(&self) -> u8 {
+        self.darts
+    }
+
+    fn get(&self, dart: u8) -> Dart {
+        self.dart.get(usize::from(dart)).copied().unwrap_or(Dart::NONE)
+    }
+
+    /// The ways of a vertex in counter-clockwise order; empty for a vertex the map does not have.
+    pub fn ways(&self, vertex: u8) -> &[u8] {
+        self.ways.get(usize::from(vertex)).and_then(|ways| ways.darts.get(..usize::from(ways.count))).unwrap_or(&[])
+    }
+
+    /// The vertex of a dart; 255 for a dart the map does not have.
+    pub fn vertex(&self, dart: u8) -> u8 {
+        self.get(dart).vertex
+    }
+
+    /// The other end of the edge of a dart; `None` for a frontier.
+    pub fn partner(&self, dart: u8) -> Option<u8> {
+        Some(self.get(dart).partner).filter(|&partner| partner != NONE)
+    }
+
+    /// The mean bearing of a dart in the frame of its vertex.
+    pub fn bearing(&self, dart: u8) -> Bearing {
+        self.get(dart).bearing
+    }
+
+    /// At how many visits a way was seen or driven; saturates.
+    pub(crate) fn seen(&self, dart: u8) -> u8 {
+        self.get(dart).seen
+    }
+
+    /// How many passages of an edge have a travel time, and the mean of the logarithms in units of 2⁻¹².
+    pub(crate) fn travel(&self, dart: u8) -> (u8, u16) {
+        let holder = self.get(self.holder(dart));
+        (holder.timed, holder.ln_travel)
+    }
+
+    fn holder(&self, dart: u8) -> u8 {
+        dart.min(self.get(dart).partner)
+    }
+
+    /// Every frontier, in the order of their numbers.
+    pub fn frontiers(&self) -> impl Iterator<Item = u8> + '_ {
+        (0..self.darts).filter(|&dart| self.get(dart).partner == NONE)
+    }
+
+    /// Every edge once, as the numbers of its two darts with the smaller first.
+    pub fn edges(&self) -> impl Iterator<Item = (u8, u8)> + '_ {
+        (0..self.darts).filter_map(|dart| self.partner(dart).filter(|&other| dart < other).map(|other| (dart, other)))
+    }
+
+    /// Adds a vertex without ways; `None` when there is no room.
+    pub fn add_vertex(&mut self) -> Option<u8> {
+        let vertex = self.vertices;
+        *self.ways.get_mut(usize::from(vertex))? = Ways::NONE;
+        self.vertices += 1;
+        Some(vertex)
+    }
+
+    /// Adds a way with a bearing to a vertex, at its place in the counter-clockwise order; `None` when there is no room.
+    pub fn add_way(&mut self, vertex: u8, bearing: Bearing) -> Option<u8> {
+        let dart = self.darts;
+        let before = self.ways(vertex).iter().take_while(|&&way| self.bearing(way) <= bearing).count();
+        let slot = self.dart.get_mut(usize::from(dart))?;
+        let ways = self.ways.get_mut(usize::from(vertex)).filter(|ways| usize::from(ways.count) < WAYS)?;
+        *slot = Dart { vertex, bearing, ..Dart::NONE };
+        let mut moved = dart;
+        for way in ways.darts.iter_mut().skip(before) {
+            core::mem::swap(way, &mut moved);
+        }
+        ways.count += 1;
+        self.darts += 1;
+        Some(dart)
+    }
+
+    /// Joins two frontiers by an edge. Nothing happens unless both are frontiers and different.
+    pub fn join(&mut self, a: u8, b: u8) {
+        if a == b || a >= self.darts || b >= self.darts || self.partner(a).is_some() || self.partner(b).is_some() {
+            return;
+        }
+        for (from, to) in [(a, b), (b, a)] {
+            if let Some(dart) = self.dart.get_mut(usize::from(from)) {
+                dart.partner = to;
+                dart.timed = 0;
+            }
+        }
+    }
+
+    /// Takes the edge of a dart away; both its ends become frontiers.
+    pub fn part(&mut self, dart: u8) {
+        if let Some(partner) = self.partner(dart) {
+            for end in [dart, partner] {
+                if let Some(dart) = self.dart.get_mut(usize::from(end)) {
+                    dart.partner = NONE;
+                }
+            }
+        }
+    }
+
+    /// The way whose bearing is closest to one, and by how much it is off; `None` for a vertex without ways.
+    pub fn nearest_way(&self, vertex: u8, bearing: Bearing) -> Option<(u8, i16)> {
+        let off = |way: u8| bearing.wrapping_sub(self.bearing(way)) as i16;
+        let ways = self.ways(vertex).iter().map(|&way| (way, off(way)));
+        ways.min_by_key(|(_, off)| off.unsigned_abs())
+    }
+
+    /// The next way of the same vertex, counter-clockwise.
+    pub fn next_way(&self, dart: u8) -> u8 {
+        let ways = self.ways(self.vertex(dart));
+        let position = ways.iter().position(|&way| way == dart).unwrap_or(0);
+        ways.get(position + 1).or(ways.first()).copied().unwrap_or(dart)
+    }
+
+    /// Whether two frontiers lie in one face: then an edge between them leaves the genus as it is. Two frontiers of parts of
+    /// the map that are not connected lie in different faces. Cost: O(D).
+    pub fn share_face(&self, a: u8, b: u8) -> bool {
+        let mut dart = a;
+        for _ in 0..=2 * u16::from(self.darts) {
+            dart = self.next_way(dart);
+            if dart == b {
+                return true;
+            }
+            if dart == a {
+                return false;
+            }
+            // Along an edge the walk arrives by the partner, and goes on with the way next to it.
+            dart = self.partner(dart).unwrap_or(dart);
+        }
+        false
+    }
+
+    /// How many faces the map has; a vertex without edges has one. Cost: O(D).
+    pub fn faces(&self) -> u16 {
+        let mut passed = [false; D];
+        let mut faces = 0;
+        for start in 0..self.darts {
+            if self.partner(start).is_none() || passed.get(usize::from(start)).is_none_or(|&passed| passed) {
+                continue;
+            }
+            faces += 1;
+            let mut dart = start;
+            while let (Some(partner), Some(passed)) =
+                (self.partner(dart), passed.get_mut(usize::from(dart)).filter(|passed| !**passed))
+            {
+                *passed = true;
+                dart = self.next_way(partner);
+                while self.partner(dart).is_none() {
+                    dart = self.next_way(dart);
+                }
+            }
+        }
+        let alone = |&vertex: &u8| self.ways(vertex).iter().all(|&way| self.partner(way).is_none());
+        faces + (0..self.vertices).filter(alone).count() as u16
+    }
+
+    /// Whether edges lead from one vertex to another. Cost: O(D).
+    pub fn are_connected(&self, a: u8, b: u8) -> bool {
+        let (mut reached, mut open) = (1_u64 << (a & 63), 1_u64 << (a & 63));
+        while open != 0 && reached >> (b & 63) & 1 == 0 {
+            let vertex = open.trailing_zeros() as u8;
+            open &= open - 1;
+            for partner in self.ways(vertex).iter().filter_map(|&way| self.partner(way)) {
+                let bit = 1_u64 << (self.vertex(partner) & 63);
+                open |= bit & !reached;
+                reached |= bit;
+            }
+        }
+        reached >> (b & 63) & 1 == 1
+    }
+
+    /// How many parts that no edge connects the map has. Cost: O(V · D).
+    pub fn components(&self) -> u8 {
+        let mut component = [0_u8; V];
+        for (number, slot) in (0..self.vertices).zip(&mut component) {
+            *slot = number;
+        }
+        let of = |component: &[u8; V], vertex: u8| component.get(usize::from(vertex)).copied().unwrap_or(0);
+        let mut components = self.vertices;
+        for (a, b) in self.edges() {
+            let (kept, joined) = (of(&component, self.vertex(a)), of(&component, self.vertex(b)));
+            if kept != joined {
+                components -= 1;
+                component.iter_mut().filter(|of| **of == joined).for_each(|of| *of = kept);
+            }
+        }
+        components
+    }
+
+    /// The genus, summed over the parts of the map: 0 for a map that can be drawn in the plane as it is. Cost: O(V · D).
+    pub fn genus(&self) -> u8 {
+        let edges = self.edges().count() as i32;
+        let euler = i32::from(self.vertices) - edges + i32::from(self.faces());
+        ((2 * i32::from(self.components()) - euler) / 2).max(0) as u8
+    }
+
+    /// Moves a way to another vertex, with its bearing there, and leaves it in the list of the first; `false` when the other has
+    /// no room.
+    pub(crate) fn move_way(&mut self, way: u8, vertex: u8, bearing: Bearing) -> bool {
+        let Some(ways) = self.ways.get_mut(usize::from(vertex)) else { return false };
+        let Some(slot) = ways.darts.get_mut(usize::from(ways.count)) else { return false };
+        *slot = way;
+        ways.count += 1;
+        if let Some(dart) = self.dart.get_mut(usize::from(way)) {
+            dart.vertex = vertex;
+            dart.bearing = bearing;
+        }
+        self.sort_ways(vertex);
+        true
+    }
+
+    /// Says which dart is the other end of one, and that one the other end of it.
+    pub(crate) fn set_partner(&mut self, dart: u8, partner: u8) {
+        for (from, to) in [(dart, partner), (partner, dart)] {
+            if let Some(dart) = self.dart.get_mut(usize::from(from)) {
+                dart.partner = to;
+            }
+        }
+    }
+
+    /// Counts a visit at which a way was `off` from its mean bearing; the order of the ways follows the bearings.
+    pub(crate) fn see(&mut self, dart: u8, off: i16) {
+        let Some(slot) = self.dart.get_mut(usize::from(dart)) else { return };
+        slot.seen = slot.seen.saturating_add(1);
+        let step = off / i16::from(slot.seen.min(100));
+        slot.bearing = slot.bearing.wrapping_add_signed(step);
+        let vertex = slot.vertex;
+        if step != 0 {
+            self.sort_ways(vertex);
+        }
+    }
+
+    /// Corrects the mean bearing of a way.
+    pub(crate) fn turn(&mut self, dart: u8, by: i16) {
+        if let Some(slot) = self.dart.get_mut(usize::from(dart)) {
+            slot.bearing = slot.bearing.wrapping_add_signed(by);
+            let vertex = slot.vertex;
+            self.sort_ways(vertex);
+        }
+    }
+
+    /// Turns the frame of a vertex.
+    pub(crate) fn turn_vertex(&mut self, vertex: u8, by: Bearing) {
+        let Some(ways) = self.ways.get(usize::from(vertex)) else { return };
+        for &way in ways.darts.iter().take(usize::from(ways.count)) {
+            if let Some(dart) = self.dart.get_mut(usize::from(way)) {
+                dart.bearing = dart.bearing.wrapping_add(by);
+            }
+        }
+        self.sort_ways(vertex);
+    }
+
+    /// Counts a passage of the edge of a dart with a travel time.
+    pub(crate) fn time(&mut self, dart: u8, ln_travel: u16) {
+        let holder = self.holder(dart);
+        let Some(slot) = self.dart.get_mut(usize::from(holder)) else { return };
+        slot.timed = slot.timed.saturating_add(1);
+        let off = i32::from(ln_travel) - i32::from(slot.ln_travel);
+        slot.ln_travel = (i32::from(slot.ln_travel) + off / i32::from(slot.timed)) as u16;
+    }
+
+    fn sort_ways(&mut self, vertex: u8) {
+        let Some(ways) = self.ways.get_mut(usize::from(vertex)) else { return };
+        let bearing = |dart: u8| self.dart.get(usize::from(dart)).map_or(0, |dart| dart.bearing);
+        let count = usize::from(ways.count).min(WAYS);
+        for end in 1..count {
+            for slot in (1..=end).rev() {
+                let (Some(&before), Some(&here)) = (ways.darts.get(slot - 1), ways.darts.get(slot)) else { break };
+                if bearing(before) <= bearing(here) {
+                    break;
+                }
+                ways.darts.swap(slot - 1, slot);
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    type Small = DartMap<8, 24>;
+
+    /// A map from the numbers of ways of its vertices and the edges between ways, both numbered from 0 in order.
+    fn map(ways: &[usize], edges: &[(u8, u8)]) -> Small {
+        let mut map = Small::EMPTY;
+        for &count in ways {
+            let vertex = map.add_vertex().unwrap();
+            (0..count).for_each(|way| {
+                map.add_way(vertex, (way * 8000) as u16).unwrap();
+            });
+        }
+        edges.iter().for_each(|&(a, b)| map.join(a, b));
+        map
+    }
+
+    /// The faces as orbits of a permutation, counted without any shortcut.
+    fn orbits(map: &Small) -> usize {
+        let driven = |vertex| -> Vec<u8> {
+            map.ways(vertex).iter().copied().filter(|&way| map.partner(way).is_some()).collect()
+        };
+        let next = |dart: u8| {
+            let arrival = map.partner(dart).unwrap();
+            let around = driven(map.vertex(arrival));
+            around[(around.iter().position(|&way| way == arrival).unwrap() + 1) % around.len()]
+        };
+        let darts: Vec<u8> = (0..map.vertices()).flat_map(driven).collect();
+        let orbit = |&start: &u8| {
+            let mut orbit = vec![start];
+            let mut dart = next(start);
+            while dart != start {
+                orbit.push(dart);
+                dart = next(dart);
+            }
+            orbit.into_iter().min()
+        };
+        darts.iter().filter(|&dart| orbit(dart) == Some(*dart)).count()
+    }
+
+    #[test]
+    fn a_tree_has_one_face_and_a_ring_two() {
+        let tree = map(&[3, 1, 1, 1], &[(0, 3), (1, 4), (2, 5)]);
+        assert_eq!((tree.faces(), tree.genus()), (1, 0));
+        let ring = map(&[2, 2, 2], &[(1, 2), (3, 4), (5, 0)]);
+        assert_eq!((ring.faces(), ring.genus()), (2, 0));
+    }
+
+    #[test]
+    fn crossed_loops_do_not_lie_in_the_plane() {
+        assert_eq!(map(&[4], &[(0, 2), (1, 3)]).genus(), 1);
+        assert_eq!(map(&[4], &[(0, 1), (2, 3)]).genus(), 0);
+        // Three parallel edges, in opposite order at the two ends and in the same.
+        assert_eq!(map(&[3, 3], &[(0, 5), (1, 4), (2, 3)]).genus(), 0);
+        assert_eq!(map(&[3, 3], &[(0, 3), (1, 4), (2, 5)]).genus(), 1);
+    }
+
+    #[test]
+    fn an_edge_keeps_the_genus_exactly_when_its_ends_share_a_face() {
+        let mut state = 1_u32;
+        let mut below = |bound: usize| {
+            state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+            ((state >> 16) as usize * bound) >> 16
+        };
+        let (mut same, mut other) = (0, 0);
+        for _ in 0..2000 {
+            let ways: Vec<usize> = (0..6).map(|_| 1 + below(4)).collect();
+            let mut map = map(&ways, &[]);
+            for _ in 0..12 {
+                let frontiers: Vec<u8> = map.frontiers().collect();
+                if frontiers.len() < 2 {
+                    break;
+                }
+                let (a, b) = (frontiers[below(frontiers.len())], frontiers[below(frontiers.len())]);
+                if a == b {
+                    continue;
+                }
+                let (genus, components, share) = (map.genus(), map.components(), map.share_face(a, b));
+                assert_eq!(share, map.share_face(b, a));
+                map.join(a, b);
+                let lone = (0..map.vertices()).filter(|&v| map.ways(v).iter().all(|&way| map.partner(way).is_none()));
+                assert_eq!(usize::from(map.faces()), orbits(&map) + lone.count());
+                if map.components() < components {
+                    assert!(!share);
+                    assert_eq!(map.genus(), genus);
+                } else {
+                    assert_eq!(map.genus(), genus + u8::from(!share));
+                    if share { same += 1 } else { other += 1 }
+                }
+            }
+        }
+        assert!(same > 100 && other > 100);
+    }
+
+    #[test]
+    fn ways_stay_in_order_and_full_tables_refuse() {
+        let mut map = Small::EMPTY;
+        let vertex = map.add_vertex().unwrap();
+        for bearing in [50_000, 1_000, 30_000, 65_000, 2_000, 40_000, 3_000] {
+            map.add_way(vertex, bearing).unwrap();
+        }
+        let bearings: Vec<u16> = map.ways(vertex).iter().map(|&way| map.bearing(way)).collect();
+        assert_eq!(bearings, [1_000, 2_000, 3_000, 30_000, 40_000, 50_000, 65_000]);
+        assert_eq!(map.add_way(vertex, 7), None);
+        assert_eq!(map.nearest_way(vertex, 65_500), Some((3, 500)));
+        assert_eq!(map.nearest_way(vertex, 200), Some((3, 736)));
+        assert_eq!((map.next_way(3), map.next_way(1)), (1, 4));
+        (1..8).for_each(|_| assert!(map.add_vertex().is_some()));
+        assert_eq!(map.add_vertex(), None);
+    }
+}
