@@ -7,7 +7,7 @@
 
 use std::error::Error;
 
-use toposlam::{Filter, Fingerprint, Observation, RobustConfig, RobustFilter};
+use toposlam::{Filter, Fingerprint, Observation, RobustConfig, RobustFilter, Ways};
 
 /// Refinement steps between two places. More steps find better maps; a robot runs one in each ring frame.
 const REFINEMENT_STEPS: usize = 20;
@@ -23,7 +23,8 @@ fn main() -> Result<(), Box<dyn Error>> {
     for line in text.lines().skip(1) {
         let (radius_mm, degree) = line.split_once(',').ok_or("a row has two columns, radius_mm and degree")?;
         let fingerprint = Fingerprint::from_radius_mm(radius_mm.parse()?)?;
-        filter.observe(Observation { degree: degree.parse().ok(), ..Observation::new(fingerprint) });
+        let ways = degree.parse().ok().and_then(|degree| Ways::from_count(degree).ok());
+        filter.observe(Observation { ways, ..Observation::new(fingerprint) });
         (0..REFINEMENT_STEPS).for_each(|_| filter.refine());
     }
     let update = filter.refresh();

@@ -8,7 +8,7 @@ use std::error::Error;
 
 use toposlam::ring::drivers::{SonarError, SonarRing};
 use toposlam::ring::{Echo, RingFrame, RingGeometry};
-use toposlam::{FaultCounters, Mapper, MapperConfig, RobustFilter};
+use toposlam::{FaultCounters, Mapper, MapperConfig, Passage, RobustFilter};
 
 /// Sensors of the ring, 45° apart, counter-clockwise, the first one straight ahead.
 const SENSORS: usize = 8;
@@ -51,7 +51,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let (mut cart, mut faults) = (Cart::default(), FaultCounters::new());
     for _ in 0..6 * FRAMES_PER_LAP {
         let frame = cart.read(&mut faults);
-        if let Some((place, update)) = mapper.observe(&frame, None) {
+        if let Some((place, update)) = mapper.observe(&frame, Passage::UNKNOWN) {
             println!("radius {} mm: vertex {}", place.fingerprint.radius_mm(), update.vertex);
         }
     }

@@ -8,7 +8,7 @@
 //! ```
 
 use toposlam::ring::{Echo, RingFrame, RingGeometry};
-use toposlam::{Mapper, MapperConfig, RobustFilter};
+use toposlam::{Mapper, MapperConfig, Passage, RobustFilter};
 
 const FRAMES: &str = include_str!("frames.csv");
 const SONARS: usize = 16;
@@ -18,8 +18,8 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     mapper.start(&MapperConfig::for_ring(RingGeometry::even()))?;
 
     for line in FRAMES.lines().skip(1) {
-        // The recording does not say how the robot left each place. A robot that knows passes it instead of `None`.
-        if let Some((place, update)) = mapper.observe(&frame(line)?, None) {
+        // The recording does not say how the robot drove. A robot with a drive passes `Drive::passage`.
+        if let Some((place, update)) = mapper.observe(&frame(line)?, Passage::UNKNOWN) {
             println!(
                 "frame {:3}: place {} of radius {} mm is vertex {}{}",
                 place.frame_index,

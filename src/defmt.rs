@@ -7,7 +7,8 @@ use defmt::{Format, Formatter, write};
 use crate::config_error::ConfigError;
 use crate::fault::{FaultCounters, FaultKind};
 use crate::filter::{
-    NgramError, NgramsFull, Observation, PaperFactors, RobustFactors, Turn, Update, WeightFactors, WorstNgram,
+    Exit, NgramError, NgramsFull, Observation, OrderedFactors, PaperFactors, RobustFactors, Update, Ways,
+    WeightFactors, WorstNgram,
 };
 use crate::map::{VertexId, VerticesFull};
 use crate::place::Place;
@@ -43,11 +44,7 @@ texts!(FaultKind {
     CommandFlood => "CommandFlood",
     DriveLost => "DriveLost",
     LoopLate => "LoopLate",
-});
-
-texts!(Turn {
-    Back => "back",
-    On => "on",
+    InvalidHint => "InvalidHint",
 });
 
 texts!(SonarFault {
@@ -112,8 +109,25 @@ impl Format for Place {
 
 impl Format for Observation {
     fn format(&self, f: Formatter<'_>) {
-        let Self { fingerprint, turn, degree, starts_sequence } = self;
-        write!(f, "{}, turn {}, degree {}, starts a sequence: {=bool}", fingerprint, turn, degree, starts_sequence);
+        let Self { fingerprint, ways, exit, travel_frames, starts_sequence } = self;
+        write!(f, "{}, ways {}, exit {}, travel {} frames", fingerprint, ways, exit, travel_frames);
+        write!(f, ", starts a sequence: {=bool}", starts_sequence);
+    }
+}
+
+impl Format for Ways {
+    fn format(&self, f: Formatter<'_>) {
+        write!(f, "{=u8}, bearings {} / 256", self.count(), self.others());
+    }
+}
+
+impl Format for Exit {
+    fn format(&self, f: Formatter<'_>) {
+        match self {
+            Self::Back => write!(f, "back"),
+            Self::On => write!(f, "on"),
+            Self::Bearing(bearing) => write!(f, "at {=u8} / 256", bearing),
+        }
     }
 }
 
@@ -149,6 +163,10 @@ impl Format for WeightFactors {
             Self::Paper(PaperFactors { ln_label_q16, ln_consistency_q16, ln_size_q16 }) => {
                 write!(f, "label {=i32}, consistency {=i32}", ln_label_q16, ln_consistency_q16);
                 ln_size_q16
+            }
+            Self::Ordered(OrderedFactors { ln_labels_q16, ln_moves_q16 }) => {
+                write!(f, "labels {=i32}, moves {=i32} / 65536 nats", ln_labels_q16, ln_moves_q16);
+                return;
             }
         };
         write!(f, ", size {=i32} / 65536 nats", ln_size_q16);

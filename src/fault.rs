@@ -47,11 +47,13 @@ pub enum FaultKind {
     DriveLost = 14,
     /// A step of the main loop took longer than its limit.
     LoopLate = 15,
+    /// A hint of an observation is invalid, or contradicts the ways seen at the place before; it was ignored.
+    InvalidHint = 16,
 }
 
 impl FaultKind {
     /// All kinds, in the order of their numbers.
-    pub const ALL: [Self; 16] = [
+    pub const ALL: [Self; 17] = [
         Self::SonarSilent,
         Self::SonarOutOfRange,
         Self::BusError,
@@ -68,6 +70,7 @@ impl FaultKind {
         Self::CommandFlood,
         Self::DriveLost,
         Self::LoopLate,
+        Self::InvalidHint,
     ];
 }
 

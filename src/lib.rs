@@ -155,13 +155,13 @@ pub mod wire;
 pub use config_error::ConfigError;
 pub use fault::{FaultCounters, FaultKind};
 pub use filter::{
-    Consistency, Direction, Evidence, Filter, FilterCapacities, History, Ngram, NgramError, NgramLength, NgramTable,
-    NgramsFull, Observation, OrderedConfig, OrderedFilter, OrderedObservation, PaperConfig, PaperFactors, PaperFilter,
-    Particle, Prior, RobustConfig, RobustFactors, RobustFilter, Turn, Update, WaysError, WaysSeen, WeightFactors,
-    WorstNgram,
+    Consistency, Direction, Evidence, Exit, Filter, FilterCapacities, History, Ngram, NgramError, NgramLength,
+    NgramTable, NgramsFull, Observation, OrderedConfig, OrderedFactors, OrderedFilter, OrderedObservation, PaperConfig,
+    PaperFactors, PaperFilter, Particle, Passage, Prior, RobustConfig, RobustFactors, RobustFilter, Update, WAYS_MAX,
+    Ways, WaysError, WaysSeen, WeightFactors, WorstNgram,
 };
 pub use map::darts::{Bearing, DartMap, WAYS};
-pub use map::{Map, PerVertex, VertexId, VertexSet, VerticesFull};
+pub use map::{DartId, Darts, Map, PerVertex, VertexId, VertexSet, VerticesFull};
 pub use mapper::{Mapper, MapperConfig};
 pub use place::{Fingerprint, FingerprintError};
 

@@ -2,7 +2,7 @@
 
 use crate::config_error::ConfigError;
 use crate::fault::FaultCounters;
-use crate::filter::{Filter, Observation, RobustConfig, Turn, Update};
+use crate::filter::{Filter, Observation, Passage, RobustConfig, Update, Ways};
 use crate::map::Map;
 use crate::place::{Place, PlaceConfig, PlaceDetector};
 use crate::ring::{RingFrame, RingGeometry};
@@ -101,15 +101,18 @@ impl<const SONARS: usize, const V: usize, F: Filter<V>> Mapper<SONARS, V, F> {
 
     /// Processes one ring frame. Returns the place and the map update when the frame completes a visit to a place.
     ///
-    /// `turn` says how the robot left the previous place; `None` if unknown. Between two places each frame runs one
+    /// `passage` is what the drive knows of the way from the previous place; [`Passage::UNKNOWN`] without a drive. Between two places each frame runs one
     /// refinement step of the filter, at most 64 of them, or 400 while the best map does not explain the observations.
     #[inline(never)]
-    pub fn observe(&mut self, frame: &RingFrame<SONARS>, turn: Option<Turn>) -> Option<(Place, Update)> {
+    pub fn observe(&mut self, frame: &RingFrame<SONARS>, passage: Passage) -> Option<(Place, Update)> {
         if let Some(place) = self.detector.observe(frame) {
             let Place { fingerprint, degree, .. } = place;
             let starts_sequence = core::mem::take(&mut self.starts_sequence);
             self.refinement_steps = 0;
-            return Some((place, self.filter.observe(Observation { fingerprint, turn, degree, starts_sequence })));
+            let Passage { exit, travel_frames, .. } = passage;
+            let ways = degree.and_then(|degree| Ways::from_count(degree).ok());
+            let observation = Observation { fingerprint, ways, exit, travel_frames, starts_sequence };
+            return Some((place, self.filter.observe(observation)));
         }
         let most = if self.filter.is_in_doubt() { REFINEMENT_STEPS_IN_DOUBT } else { REFINEMENT_STEPS };
         if self.refinement_steps < most {

@@ -6,7 +6,7 @@
 //! cargo run --release -p toposlam-host-tests --example bench_input -- frames > src/bin/bench/frames.rs
 //! ```
 
-use toposlam::Turn;
+use toposlam::Exit;
 use toposlam::place::Place;
 use toposlam::reference::{self, Detector};
 use toposlam_sim::world::{Plan, RobotModel, Simulation};
@@ -46,8 +46,8 @@ fn main() {
                 let hints = row.iter().map(|(place, turn)| {
                     let turn = match turn {
                         None => '-',
-                        Some(Turn::Back) => 'b',
-                        Some(Turn::On) => 'o',
+                        Some(Exit::Back) => 'b',
+                        Some(_) => 'o',
                     };
                     format!("*b\"{turn}{}\"", place.degree.unwrap_or(0))
                 });
@@ -75,7 +75,7 @@ fn main() {
 }
 
 /// The places of a drive, and what the drive knows of how the robot left the place before each.
-fn places(simulation: Simulation) -> Vec<(Place, Option<Turn>)> {
+fn places(simulation: Simulation) -> Vec<(Place, Option<Exit>)> {
     let mut detector = Detector::new();
     detector.start(reference::PLACE, reference::RING).expect("the reference settings are valid");
     let places = simulation.filter_map(|(frame, truth)| Some((detector.observe(&frame)?, truth.turn)));

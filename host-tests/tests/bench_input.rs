@@ -1,6 +1,6 @@
 //! The input that the bench image carries is what the simulation gives.
 
-use toposlam::Turn;
+use toposlam::Exit;
 use toposlam::reference::{self, Detector};
 use toposlam::ring::Echo;
 use toposlam_sim::world::{Plan, RobotModel, SONARS, Simulation};
@@ -29,8 +29,8 @@ fn the_recorded_bench_input_is_the_drive_through_the_office() {
             assert_eq!(place.fingerprint.radius_mm(), PLACES_MM[places], "place {places}");
             let turn = match truth.turn {
                 None => b'-',
-                Some(Turn::Back) => b'b',
-                Some(Turn::On) => b'o',
+                Some(Exit::Back) => b'b',
+                Some(_) => b'o',
             };
             assert_eq!([turn, b'0' + place.degree.unwrap_or(0)], HINTS[places], "place {places}");
             places += 1;

@@ -1,6 +1,6 @@
 //! Exploration of the simulated world with faulty sonars: collisions, places found, and turn hints.
 
-use toposlam::Turn;
+use toposlam::Exit;
 use toposlam::reference::SNAPSHOT_BYTES;
 use toposlam_eval::mapping::score_exploration;
 use toposlam_sim::exploration::Exploration;
@@ -28,10 +28,10 @@ fn explore(plan: &str, sonar: SonarModel, seed: u64, places: usize) -> Outcome {
         assert!(exploration.frames() < 1000 * places as u64, "after {} places", exploration.places());
         let found = exploration.advance().is_some();
         if let ([.., Some(before), Some(_), Some(now)], true, Some(turn)) = (exploration.nodes(), found, told) {
-            let is_right = (turn == Turn::Back) == (before == now);
+            let is_right = (turn == Exit::Back) == (before == now);
             turns = (turns.0 + usize::from(is_right), turns.1 + usize::from(!is_right));
         }
-        told = exploration.robot().drive().turn();
+        told = exploration.robot().drive().passage().exit;
     }
     let report = exploration.ground_truth().report();
     Outcome { report, touched: exploration.rover().bumps(), turns, located: score_exploration(&exploration).location }

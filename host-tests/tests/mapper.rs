@@ -7,7 +7,7 @@ use toposlam::reference::{self, PaperReference, SONARS, VERTICES};
 use toposlam::wire::{
     Arrival, Belief, Capacities, Header, Hello, Location, MapReplica, Message, Reporter, ResetCause, Worst,
 };
-use toposlam::{FaultCounters, Filter, Mapper, MapperConfig, Observation, Turn};
+use toposlam::{Exit, FaultCounters, Filter, Mapper, MapperConfig, Observation, Ways};
 use toposlam_sim::world::{Plan, RobotModel, Simulation};
 
 fn config<C: Copy>(filter: C) -> MapperConfig<SONARS, C> {
@@ -20,18 +20,17 @@ fn simulation() -> Simulation {
 }
 
 #[test]
-fn the_filter_hears_of_radius_degree_and_turn() {
+fn the_filter_observes_radius_ways_and_exit() {
     let mut mapper = Mapper::<SONARS, VERTICES, Notes>::new();
     assert!(mapper.start(&config(0)).is_err());
     mapper.start(&config(99)).unwrap();
     let mut expected = Vec::new();
     for (frame, truth) in simulation() {
-        if let Some((place, _)) = mapper.observe(&frame, truth.turn) {
+        if let Some((place, _)) = mapper.observe(&frame, truth.passage()) {
             expected.push(Observation {
-                fingerprint: place.fingerprint,
-                turn: truth.turn,
-                degree: place.degree,
-                starts_sequence: false,
+                exit: truth.turn,
+                ways: place.degree.and_then(|degree| Ways::from_count(degree).ok()),
+                ..Observation::new(place.fingerprint)
             });
         }
         if expected.len() == 12 {
@@ -39,8 +38,8 @@ fn the_filter_hears_of_radius_degree_and_turn() {
         }
     }
     assert_eq!(mapper.filter().observations, expected);
-    assert!(expected.iter().any(|observation| observation.turn == Some(Turn::Back)));
-    assert!(expected.iter().any(|observation| observation.degree == Some(3)));
+    assert!(expected.iter().any(|observation| observation.exit == Some(Exit::Back)));
+    assert!(expected.iter().any(|observation| observation.ways == Ways::from_count(3).ok()));
     let capacities = Capacities::of_mapper::<SONARS, VERTICES, Notes>(&config(99));
     assert_eq!((capacities.hypotheses, capacities.history, capacities.ngram_length), (7, 99, 3));
 }
@@ -56,7 +55,7 @@ fn a_listener_has_what_the_filter_believes<F: Filter<VERTICES>>(settings: F::Con
     let mut sequence = 0;
     let mut places = 0;
     for (frame, truth) in simulation() {
-        let seen = mapper.observe(&frame, truth.turn);
+        let seen = mapper.observe(&frame, truth.passage());
         reporter.report(&mapper, seen.as_ref(), &FaultCounters::new(), |message: &Message| {
             replica.apply(Header { sequence, arrival: Arrival::InOrder }, message);
             sequence = sequence.wrapping_add(1);

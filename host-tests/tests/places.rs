@@ -8,7 +8,7 @@ use proptest::prelude::*;
 use toposlam::place::{Place, PlaceConfig, PlaceDetector};
 use toposlam::reference;
 use toposlam::ring::{Echo, RingFrame};
-use toposlam::{FaultKind, Turn};
+use toposlam::{Exit, FaultKind};
 use toposlam_eval::range_csv::Ring;
 use toposlam_sim::world::{GroundTruth, Plan, Report, RobotModel, SONARS, Simulation, SonarModel};
 
@@ -73,10 +73,10 @@ fn the_turn_hint_of_the_drive_is_right_at_every_place() {
     }
     let nodes: Vec<_> = ground_truth.detections().iter().map(|detection| detection.node.unwrap()).collect();
     for (index, nodes) in nodes.windows(3).enumerate() {
-        let expected = if nodes[0] == nodes[2] { Turn::Back } else { Turn::On };
+        let expected = if nodes[0] == nodes[2] { Exit::Back } else { Exit::On };
         assert_eq!(turns[index + 2], Some(expected), "place {}", index + 2);
     }
-    assert!(turns.iter().filter(|turn| **turn == Some(Turn::Back)).count() > 10);
+    assert!(turns.iter().filter(|turn| **turn == Some(Exit::Back)).count() > 10);
 }
 
 #[test]

@@ -4,7 +4,7 @@ mod common;
 
 use common::drive::Random;
 use common::watched::{Counts, Watched};
-use toposlam::{Filter, Fingerprint, Observation, RobustConfig, Turn};
+use toposlam::{Exit, Filter, Fingerprint, Observation, RobustConfig, Ways};
 use toposlam_host_tests::graph::Graph;
 
 /// The hints of a drive.
@@ -43,13 +43,14 @@ fn drive(
         let wrong = random.below(10) == 0;
         // At the first two places of a sequence a hint has no meaning and must change nothing.
         let is_back = before.map_or(random.below(2) == 0, |before| (before == place) != wrong);
-        let turn = (hints.turns && random.below(4) > 0).then_some(if is_back { Turn::Back } else { Turn::On });
+        let turn = (hints.turns && random.below(4) > 0).then_some(if is_back { Exit::Back } else { Exit::On });
         let exits = building.neighbours(place).len() as u8;
         let degree = (hints.degrees && random.below(4) > 0).then(|| if wrong { exits + 1 } else { exits });
         let noise = random.below(2 * noise_steps + 1) as f64 - noise_steps as f64;
         let steps = building.label(place) / 2.0 + noise;
         let fingerprint = Fingerprint::from_steps(steps as u16).expect("labels of tests are in range");
-        Observation { fingerprint, turn, degree, starts_sequence }
+        let ways = degree.map(|degree| Ways::from_count(degree).expect("a place of a test has few ways"));
+        Observation { ways, exit: turn, starts_sequence, ..Observation::new(fingerprint) }
     };
     (0..places).map(&mut observe).collect()
 }

@@ -6,7 +6,7 @@ use super::{DriveConfig, VelocityCommand};
 use crate::bearing::{HALF_TURN_MRAD, rotated, turn_mrad};
 use crate::config_error::ConfigError;
 use crate::fault::{FaultCounters, FaultKind};
-use crate::filter::Turn;
+use crate::filter::Exit;
 use crate::place::{Obstacle, Obstacles, Openings, RingScan};
 use crate::ring::Echo;
 
@@ -63,7 +63,7 @@ pub(super) struct Exits {
     pub(super) is_entry_first: bool,
 }
 
-/// How the robot left the place that was reported last. `Option<Turn>` is not all zero, so a `static` robot would not be in
+/// How the robot left the place that was reported last. `Option<Exit>` is not all zero, so a `static` robot would not be in
 /// `.bss`.
 #[derive(Clone, Copy, Debug)]
 enum Left {
@@ -129,11 +129,11 @@ impl LocalPlanner {
         }
     }
 
-    pub(super) const fn turn(&self) -> Option<Turn> {
+    pub(super) const fn exit(&self) -> Option<Exit> {
         match self.left {
             Left::Unknown => None,
-            Left::Back => Some(Turn::Back),
-            Left::On => Some(Turn::On),
+            Left::Back => Some(Exit::Back),
+            Left::On => Some(Exit::On),
         }
     }
 

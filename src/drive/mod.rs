@@ -39,7 +39,7 @@ pub(crate) use departures::is_departure;
 
 use crate::config_error::ConfigError;
 use crate::fault::FaultCounters;
-use crate::filter::{Filter, Turn};
+use crate::filter::{Filter, Passage};
 use crate::map::VertexId;
 use crate::place::{Place, PlaceDetector};
 use local_planner::LocalPlanner;
@@ -109,9 +109,9 @@ impl<const V: usize, const HISTORY: usize> Drive<V, HISTORY> {
             .advance(&detector.scan(), detector.is_at_place(), |exits| route_planner.choose(filter, exits))
     }
 
-    /// How the robot left the place that was reported last: the turn hint of the next observation. `None` when unknown.
-    pub const fn turn(&self) -> Option<Turn> {
-        self.local_planner.turn()
+    /// How the robot drives from the place that was reported last: the hints of the next observation.
+    pub const fn passage(&self) -> Passage {
+        Passage { exit: self.local_planner.exit(), ..Passage::UNKNOWN }
     }
 
     /// Sets the goal. A robot that stopped at a place chooses an exit again.

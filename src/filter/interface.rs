@@ -4,7 +4,7 @@ use super::{Update, WorstNgram};
 use crate::config_error::ConfigError;
 use crate::fault::FaultCounters;
 use crate::filter::Observation;
-use crate::map::{Map, VertexId};
+use crate::map::{DartId, Darts, Map, VertexId};
 
 /// The capacities of a filter with a configuration.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -52,7 +52,19 @@ pub trait Filter<const V: usize>: Sized {
     /// The best map.
     fn map(&self) -> &Map<V>;
 
-    /// Faults since the start: full tables.
+    /// The ways of the best map: [`Filter::map`] with the order and the bearings of the ways. `None` for a filter that knows
+    /// edges only.
+    fn darts(&self) -> Option<Darts<'_>> {
+        None
+    }
+
+    /// The way by which the robot came to the newest place, on the best map. `None` for a filter that knows edges only, and
+    /// after a place that starts a sequence.
+    fn arrival(&self) -> Option<DartId> {
+        None
+    }
+
+    /// Faults since the start: full tables, invalid hints.
     fn faults(&self) -> &FaultCounters;
 
     /// The vertex of the place `ago` places before the newest, on the best path; `None` when the filter does not know it.

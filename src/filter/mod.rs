@@ -5,15 +5,17 @@ mod observation;
 mod ordered;
 mod paper;
 pub(crate) mod robust;
+mod ways;
 
 pub use interface::{Filter, FilterCapacities};
-pub use observation::{Observation, Turn};
-pub use ordered::{OrderedConfig, OrderedFilter, OrderedObservation, WaysError, WaysSeen};
+pub use observation::{Observation, Passage};
+pub use ordered::{OrderedConfig, OrderedFilter, OrderedObservation, WaysSeen};
 pub use paper::{
     Consistency, Direction, Evidence, History, Ngram, NgramError, NgramLength, NgramTable, NgramsFull, PaperConfig,
     PaperFilter, Particle, Prior,
 };
 pub use robust::{RobustConfig, RobustFilter};
+pub use ways::{Exit, WAYS_MAX, Ways, WaysError};
 
 use crate::map::VertexId;
 use rand_core::SeedableRng;
@@ -66,6 +68,8 @@ pub enum WeightFactors {
     Robust(RobustFactors),
     /// Of a [`PaperFilter`].
     Paper(PaperFactors),
+    /// Of an [`OrderedFilter`].
+    Ordered(OrderedFactors),
 }
 
 impl WeightFactors {
@@ -75,6 +79,7 @@ impl WeightFactors {
         let (ln_size, ln_label, ln_rest) = match self {
             Self::Robust(factors) => (factors.ln_size_q16, factors.ln_labels_q16, factors.ln_moves_q16),
             Self::Paper(factors) => (factors.ln_size_q16, factors.ln_label_q16, factors.ln_consistency_q16),
+            Self::Ordered(factors) => (0, factors.ln_labels_q16, factors.ln_moves_q16),
         };
         ln_size.saturating_add(ln_label).saturating_add(ln_rest)
     }
@@ -94,6 +99,15 @@ pub struct RobustFactors {
 impl RobustFactors {
     /// No evidence.
     pub(crate) const ONE: Self = Self { ln_labels_q16: 0, ln_moves_q16: 0, ln_size_q16: 0 };
+}
+
+/// The factors of the weight of a hypothesis of the ordered filter, as natural logarithms in units of 2⁻¹⁶ nats.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct OrderedFactors {
+    /// The evidence of the observed labels, with the means and variances of the vertices integrated out.
+    pub ln_labels_q16: i32,
+    /// The evidence of exits, ways, travel times and closures, and the prior of the map.
+    pub ln_moves_q16: i32,
 }
 
 /// The factors of the weight of a particle of the paper's filter (Eq. 6), as natural logarithms in units of 2⁻¹⁶ nats.

@@ -1,38 +1,51 @@
-//! An observation: the fingerprint of a place, and two optional hints that need no odometry.
+//! An observation: the fingerprint of a place, and hints that need no odometry.
 
+use super::ways::{Exit, Ways};
 use crate::place::Fingerprint;
 
-/// How the robot left the place before: whether it drove back along the edge by which it had come.
-///
-/// The drive of the robot knows this without odometry. A wrong hint makes the right map less likely but not impossible.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub enum Turn {
-    /// It turned back: this place should be the second last one.
-    Back,
-    /// It drove on: this place should not be the second last one.
-    On,
+/// How the robot drove from the place before to this one, as far as its drive knows.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Passage {
+    /// The exit by which the robot left the place before.
+    pub exit: Option<Exit>,
+    /// The number of ring frames since it left that place, 1 or more.
+    pub travel_frames: Option<u16>,
+    /// The bearing in the ring's geometry of the way by which it came to this place, in milliradians. `None` without a drive; the
+    /// way is then searched straight behind.
+    pub entry_mrad: Option<i16>,
 }
 
-/// An observation of a place.
+impl Passage {
+    /// Nothing is known.
+    pub const UNKNOWN: Self = Self { exit: None, travel_frames: None, entry_mrad: None };
+}
+
+/// An observation of a place. `None` stands for a hint that the detector or the drive does not know.
 ///
 /// ```
-/// use toposlam::{Fingerprint, Observation, Turn};
+/// use toposlam::{Exit, Fingerprint, Observation, Ways};
 ///
-/// // A dead end, to which the robot drove on. `None` stands for a hint that the detector or the drive does not know.
-/// let radius = Fingerprint::from_radius_mm(640)?;
-/// let observation = Observation { turn: Some(Turn::On), degree: Some(1), ..Observation::new(radius) };
+/// // A dead end, 120 ring frames from the place before. The robot left that place by the way on its left.
+/// let observation = Observation {
+///     ways: Some(Ways::from_bearings_mrad(&[])?),
+///     exit: Some(Exit::from_bearing_mrad(4712)?),
+///     travel_frames: Some(120),
+///     ..Observation::new(Fingerprint::from_radius_mm(640)?)
+/// };
 /// assert!(!observation.starts_sequence);
-/// # Ok::<(), toposlam::FingerprintError>(())
+/// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Observation {
     /// The radius of the place.
     pub fingerprint: Fingerprint,
-    /// How the robot left the place before. It has no meaning at the first two places of a sequence.
-    pub turn: Option<Turn>,
-    /// The number of exits of the place, 1 to 7, if the detector could count them. Larger numbers count as 7, and 0 as
-    /// unknown.
-    pub degree: Option<u8>,
+    /// The ways of the place.
+    pub ways: Option<Ways>,
+    /// The exit by which the robot left the place before. It has no meaning at the first place of a sequence.
+    pub exit: Option<Exit>,
+    /// The number of ring frames between the place before and this one. 0 is invalid: a filter that uses it counts a
+    /// [`FaultKind::InvalidHint`](crate::FaultKind::InvalidHint), and the time is unknown.
+    pub travel_frames: Option<u16>,
     /// Whether the robot did not drive here from the place before: it was kidnapped, or this is the first place of an n-gram of
     /// an earlier exploration. The first place of all always starts a sequence.
     pub starts_sequence: bool,
@@ -41,7 +54,12 @@ pub struct Observation {
 impl Observation {
     /// An observation without hints.
     pub const fn new(fingerprint: Fingerprint) -> Self {
-        Self { fingerprint, turn: None, degree: None, starts_sequence: false }
+        Self { fingerprint, ways: None, exit: None, travel_frames: None, starts_sequence: false }
+    }
+
+    /// The number of ways; 0 if it is unknown.
+    pub(crate) fn degree(&self) -> u8 {
+        self.ways.map_or(0, Ways::count)
     }
 }
 

@@ -5,6 +5,8 @@
 //! frontiers are left out. For a connected map of V vertices, E edges and F faces, V − E + F = 2 − 2 · genus (Euler), and a map
 //! that can be drawn in the plane has genus 0.
 
+use super::dart::Darts;
+
 /// The most ways of a vertex.
 pub const WAYS: usize = 7;
 
@@ -16,17 +18,17 @@ pub type Bearing = u16;
 
 /// One way of one vertex: 8 bytes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-struct Dart {
-    vertex: u8,
-    partner: u8,
+pub(super) struct Dart {
+    pub(super) vertex: u8,
+    pub(super) partner: u8,
     /// In the frame of its vertex.
-    bearing: Bearing,
+    pub(super) bearing: Bearing,
     /// At how many visits the way was seen or driven.
-    seen: u8,
+    pub(super) seen: u8,
     /// How many passages of the edge have a travel time. Held by the end with the smaller number.
-    timed: u8,
+    pub(super) timed: u8,
     /// Mean of ln(travel time in ring frames) in units of 2⁻¹². Held as `timed`.
-    ln_travel: u16,
+    pub(super) ln_travel: u16,
 }
 
 impl Dart {
@@ -35,13 +37,17 @@ impl Dart {
 
 /// The darts of a vertex in counter-clockwise order.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-struct Ways {
+pub(super) struct VertexWays {
     count: u8,
     darts: [u8; WAYS],
 }
 
-impl Ways {
+impl VertexWays {
     const NONE: Self = Self { count: 0, darts: [NONE; WAYS] };
+
+    pub(super) fn as_slice(&self) -> &[u8] {
+        self.darts.get(..usize::from(self.count)).unwrap_or(&[])
+    }
 }
 
 /// An edge-ordered map of at most `V` vertices (`V` ≤ 64) and `D` darts (`D` ≤ 254); vertices and darts are numbered from 0
@@ -52,7 +58,7 @@ impl Ways {
 pub struct DartMap<const V: usize, const D: usize> {
     vertices: u8,
     darts: u8,
-    ways: [Ways; V],
+    ways: [VertexWays; V],
     dart: [Dart; D],
 }
 
@@ -61,14 +67,22 @@ impl<const V: usize, const D: usize> DartMap<V, D> {
     pub const EMPTY: Self = {
         assert!(V >= 1 && V <= 64, "a map holds 1 to 64 vertices");
         assert!(D >= 2 && D <= 254, "a map holds 2 to 254 darts");
-        Self { vertices: 0, darts: 0, ways: [Ways::NONE; V], dart: [Dart::NONE; D] }
+        Self { vertices: 0, darts: 0, ways: [VertexWays::NONE; V], dart: [Dart::NONE; D] }
     };
 
     /// Removes all vertices and darts. Cost: O(V).
     pub fn clear(&mut self) {
         self.vertices = 0;
         self.darts = 0;
-        self.ways.fill(Ways::NONE);
+        self.ways.fill(VertexWays::NONE);
+    }
+
+    /// Read access with typed numbers.
+    pub fn view(&self) -> Darts<'_> {
+        Darts::new(
+            self.ways.get(..usize::from(self.vertices)).unwrap_or(&[]),
+            self.dart.get(..usize::from(self.darts)).unwrap_or(&[]),
+        )
     }
 
     /// How many vertices the map has.
@@ -133,7 +147,7 @@ impl<const V: usize, const D: usize> DartMap<V, D> {
     /// Adds a vertex without ways; `None` when there is no room.
     pub fn add_vertex(&mut self) -> Option<u8> {
         let vertex = self.vertices;
-        *self.ways.get_mut(usize::from(vertex))? = Ways::NONE;
+        *self.ways.get_mut(usize::from(vertex))? = VertexWays::NONE;
         self.vertices += 1;
         Some(vertex)
     }

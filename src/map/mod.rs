@@ -1,10 +1,12 @@
 //! The topological map: a labelled graph of places and the connections between them (Section II of the paper).
 
+mod dart;
 pub(crate) mod darts;
 mod per_vertex;
 mod vertex;
 mod vertex_set;
 
+pub use dart::{DartId, Darts};
 pub use per_vertex::PerVertex;
 pub use vertex::VertexId;
 pub use vertex_set::VertexSet;

@@ -202,7 +202,7 @@ impl<'buffer, const SONARS: usize, const N: usize, const V: usize, const HISTORY
         board: &mut impl Board,
     ) -> (Seen, VelocityCommand) {
         let mut line = Line { encoder: &mut self.encoder, faults: &mut self.faults, board };
-        let seen = self.mapper.observe(frame, self.drive.turn());
+        let seen = self.mapper.observe(frame, self.drive.passage());
         self.reporter.report(&self.mapper, seen.as_ref(), faults, |message| line.send(message));
         let place = seen.as_ref().map(|(place, _)| place);
         let velocity = self.drive.advance(self.mapper.detector(), self.mapper.filter(), place);

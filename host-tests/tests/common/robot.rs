@@ -2,7 +2,7 @@
 
 use super::drive::Random;
 use std::collections::BTreeSet;
-use toposlam::{Filter, Fingerprint, Observation, RobustFilter, Turn};
+use toposlam::{Exit, Filter, Fingerprint, Observation, RobustFilter, Ways};
 use toposlam_eval::{environment::Environment, equivalence::SmallestEquivalent, graph::Graph, score::score_map};
 
 /// The hints of the robot besides fingerprints, and how often they are missing or wrong.
@@ -72,7 +72,7 @@ impl<'a> Robot<'a> {
         let turned_back = self.walk.iter().skip(self.put_down).rev().nth(2).map(|&before| before == place);
         let [missing_turn, wrong_turn, missing_degree] = [(); 3].map(|()| self.random.below(100));
         let turn = turned_back.filter(|_| self.hints.turn && missing_turn >= self.hints.missing_percent);
-        let turn = turn.map(|back| if back != (wrong_turn < self.hints.wrong_percent) { Turn::Back } else { Turn::On });
+        let turn = turn.map(|back| if back != (wrong_turn < self.hints.wrong_percent) { Exit::Back } else { Exit::On });
         let ways = self.environment.neighbours()[place].len() as u8;
         let told = match self.random.below(20) {
             0 => ways.saturating_sub(1).max(1),
@@ -81,7 +81,8 @@ impl<'a> Robot<'a> {
         };
         let degree = (self.hints.degree && missing_degree >= self.hints.missing_percent).then_some(told);
         let begins = carried.is_some_and(|(_, is_told)| is_told);
-        Observation { fingerprint: self.look(place), turn, degree, starts_sequence: begins }
+        let ways = degree.and_then(|degree| Ways::from_count(degree).ok());
+        Observation { ways, exit: turn, starts_sequence: begins, ..Observation::new(self.look(place)) }
     }
 
     /// The fingerprint of a place with Gaussian noise, the sum of twelve uniform numbers.

@@ -1,7 +1,7 @@
 //! A robust filter whose results are compared with their definitions after every place.
 
 use toposlam::{
-    Consistency, Direction, Filter, Fingerprint, History, NgramLength, Observation, RobustConfig, RobustFilter, Turn,
+    Consistency, Direction, Exit, Filter, Fingerprint, History, NgramLength, Observation, RobustConfig, RobustFilter,
     Update,
 };
 use toposlam_host_tests::consistency::hausdorff;
@@ -117,8 +117,8 @@ impl<const N: usize, const V: usize, const HISTORY: usize> Watched<N, V, HISTORY
     fn seen(&self) -> Vec<robust::Observation> {
         let seen = |(at, observation): (usize, &Observation)| robust::Observation {
             label: f64::from(observation.fingerprint.steps()),
-            turned_back: observation.turn.map(|turn| turn == Turn::Back),
-            degree: observation.degree.filter(|&degree| degree > 0).map(|degree| usize::from(degree).min(7)),
+            turned_back: observation.exit.map(Exit::is_back),
+            degree: observation.ways.map(|ways| usize::from(ways.count())),
             starts_sequence: at == 0 || observation.starts_sequence,
         };
         self.observations.iter().enumerate().map(seen).collect()

@@ -5,6 +5,7 @@ use common::random::cases;
 use common::watched::Watched;
 use proptest::collection::vec;
 use proptest::prelude::*;
+use toposlam::Ways;
 
 fn seen(radius_mm: u16) -> Observation {
     Observation::new(Fingerprint::from_radius_mm(radius_mm).unwrap())
@@ -23,31 +24,15 @@ fn a_full_map_keeps_its_vertices_and_reports_the_fault() {
 }
 
 #[test]
-fn degree_0_counts_as_unknown_and_large_degrees_as_7() {
-    let environment = easy();
-    let [none, seven] = [(None, Some(0)), (Some(7), Some(200))].map(|(plain, odd)| {
-        let results = [plain, odd].map(|degree| {
-            let mut robot = Robot::new(&environment, Hints::default(), 2);
-            let mut filter = started::<10, 8, 64>(2);
-            let mut observe = |_| filter.observe(Observation { degree, ..robot.step() });
-            let updates: Vec<_> = (0..60).map(&mut observe).collect();
-            (updates, filter.evidence(), filter.path().collect::<Vec<_>>())
-        });
-        results[0] == results[1]
-    });
-    assert!(none && seven);
-}
-
-#[test]
 fn turn_hints_at_the_first_two_places_of_a_sequence_are_ignored() {
-    let paths = [None, Some(Turn::Back), Some(Turn::On)].map(|turn| {
+    let paths = [None, Some(Exit::Back), Some(Exit::On)].map(|turn| {
         let environment = easy();
         let mut robot = Robot::new(&environment, Hints::default(), 3);
         let mut filter = started::<10, 8, 64>(3);
         for place in 0..40 {
             let begins = place == 0 || place == 20;
             let turn = turn.filter(|_| begins || place == 1 || place == 21);
-            filter.observe(Observation { turn, starts_sequence: begins, ..robot.step() });
+            filter.observe(Observation { exit: turn, starts_sequence: begins, ..robot.step() });
         }
         (filter.evidence(), filter.path().collect::<Vec<_>>())
     });
@@ -105,7 +90,8 @@ fn statistics_of_a_sequence_that_left_the_history_stay_with_their_vertex() {
     ];
     let observation = |&(steps, degree, starts_sequence): &(u16, Option<u8>, bool)| {
         let fingerprint = Fingerprint::from_steps(steps).unwrap();
-        (Observation { fingerprint, turn: None, degree, starts_sequence }, 0)
+        let ways = degree.map(|degree| Ways::from_count(degree).unwrap());
+        (Observation { ways, starts_sequence, ..Observation::new(fingerprint) }, 0)
     };
     let observations: Vec<(Observation, u8)> = places.iter().map(observation).collect();
     bears::<3, 4>(config, &observations, 4_264_363_679_906_593_650);
@@ -115,11 +101,17 @@ fn statistics_of_a_sequence_that_left_the_history_stay_with_their_vertex() {
 fn anything() -> impl Strategy<Value = Observation> {
     let steps =
         prop_oneof![4 => (0_u16..4, 0_u16..8).prop_map(|(kind, noise)| 400 + 50 * kind + noise), 1 => 0..=4094_u16];
-    let turn = prop_oneof![2 => Just(None), 1 => Just(Some(Turn::Back)), 1 => Just(Some(Turn::On))];
-    let degree = prop_oneof![2 => Just(None), 2 => (1_u8..5).prop_map(Some), 1 => any::<u8>().prop_map(Some)];
-    (steps, turn, degree, prop::bool::weighted(0.1)).prop_map(|(steps, turn, degree, starts_sequence)| {
+    let exit = prop_oneof![
+        2 => Just(None),
+        1 => Just(Some(Exit::Back)),
+        1 => Just(Some(Exit::On)),
+        1 => any::<u8>().prop_map(|bearing| Some(Exit::Bearing(bearing))),
+    ];
+    let ways = prop_oneof![2 => Just(None), 2 => (1_u8..5).prop_map(Some), 1 => (1_u8..8).prop_map(Some)];
+    (steps, exit, ways, prop::bool::weighted(0.1)).prop_map(|(steps, exit, ways, starts_sequence)| {
         let fingerprint = Fingerprint::from_steps(steps).unwrap();
-        Observation { fingerprint, turn, degree, starts_sequence }
+        let ways = ways.and_then(|count| Ways::from_count(count).ok());
+        Observation { ways, exit, starts_sequence, ..Observation::new(fingerprint) }
     })
 }
 

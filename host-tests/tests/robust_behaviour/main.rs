@@ -11,7 +11,7 @@ use common::drive::Random;
 use common::environments::{easy, floor, ring_with_a_repeated_part, six_rooms};
 use common::robot::{Hints, Robot, TURNS};
 use common::vertex;
-use toposlam::{FaultKind, Filter, Fingerprint, Map, Observation, RobustConfig, RobustFilter, Turn, VertexId};
+use toposlam::{Exit, FaultKind, Filter, Fingerprint, Map, Observation, RobustConfig, RobustFilter, VertexId};
 use toposlam_eval::environment::Environment;
 use toposlam_eval::walk::all_walks;
 

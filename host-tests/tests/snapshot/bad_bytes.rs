@@ -6,7 +6,7 @@ use proptest::collection::vec;
 use proptest::prelude::*;
 use std::sync::LazyLock;
 use toposlam::Filter;
-use toposlam::Turn;
+use toposlam::{Exit, Ways};
 
 type Small = RobustFilter<3, 6, 12>;
 
@@ -34,12 +34,12 @@ static CONTENTS: LazyLock<Vec<Vec<u8>>> = LazyLock::new(|| {
 fn exercise(filter: &mut Small) {
     for index in 0..40_u16 {
         let steps = 400 + 90 * (index * 5 % 7) + index % 3;
-        let turn = [None, Some(Turn::Back), Some(Turn::On)][usize::from(index % 3)];
+        let turn = [None, Some(Exit::Back), Some(Exit::On)][usize::from(index % 3)];
         let observation = Observation {
-            fingerprint: Fingerprint::from_steps(steps).unwrap(),
-            turn,
-            degree: (index % 2 == 0).then_some(3),
+            exit: turn,
+            ways: Ways::from_count(3).ok().filter(|_| index % 2 == 0),
             starts_sequence: index % 11 == 10,
+            ..Observation::new(Fingerprint::from_steps(steps).unwrap())
         };
         let update = filter.observe(observation);
         assert!(filter.map().vertices().len() <= 6 && update.vertex.index() < 6);

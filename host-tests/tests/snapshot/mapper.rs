@@ -20,7 +20,7 @@ fn drive<F: Filter<VERTICES>>(mapper: &mut Mapper<SONARS, VERTICES, F>, simulati
     let mut seen = 0;
     while seen < places {
         let (frame, truth) = simulation.next().unwrap();
-        let place = mapper.observe(&frame, truth.turn);
+        let place = mapper.observe(&frame, truth.passage());
         seen += usize::from(place.is_some());
     }
 }
@@ -85,7 +85,7 @@ fn a_robot_restored_during_a_drive_ends_with_the_same_map() {
     assert_eq!(map_digest(restored.map()), map_digest(mapper.map()));
     for (frame, truth) in simulation.take(4000) {
         for mapper in [&mut mapper, &mut restored] {
-            mapper.observe(&frame, truth.turn);
+            mapper.observe(&frame, truth.passage());
         }
     }
     assert_eq!(map_digest(restored.map()), map_digest(mapper.map()));

@@ -20,7 +20,7 @@ fn after(places: u32, every: u32) -> (Robot16, Store<Sectors>) {
     let mut buffer = [0; reference::SNAPSHOT_BYTES];
     let simulation = Simulation::new(&Plan::built_in("office").unwrap(), RobotModel::default(), 3).unwrap();
     for (frame, truth) in simulation {
-        if mapper.observe(&frame, truth.turn).is_some() {
+        if mapper.observe(&frame, truth.passage()).is_some() {
             let observed = mapper.filter().observed();
             if observed.is_multiple_of(every) {
                 let length = mapper.snapshot(&mut buffer).unwrap();

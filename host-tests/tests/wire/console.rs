@@ -75,7 +75,7 @@ impl FakeRobot {
         if !self.paused {
             let (frame, truth) = self.world.next().expect("the drive never ends");
             let said = &mut self.said;
-            let seen = self.mapper.observe(&frame, truth.turn);
+            let seen = self.mapper.observe(&frame, truth.passage());
             self.reporter.report(&self.mapper, seen.as_ref(), self.inbox.faults(), |message| {
                 said.push(*message);
                 Ok(())

@@ -10,7 +10,7 @@ use super::{
 };
 use serde::Serialize;
 use std::{collections::BTreeMap, fmt, fs, io, path::Path};
-use toposlam::Turn;
+use toposlam::Exit;
 
 /// Why paths were not written.
 #[derive(Debug)]
@@ -118,12 +118,12 @@ fn table(trial: &Trial) -> io::Result<Vec<u8>> {
     writer.write_record(["place", "radius_mm", "turn", "degree"])?;
     for (step, visit) in trial.visits.iter().enumerate() {
         let observation = visit.observation;
-        let turn = match observation.turn {
-            Some(Turn::Back) => "back",
-            Some(Turn::On) => "on",
+        let turn = match observation.exit {
+            Some(Exit::Back) => "back",
+            Some(_) => "on",
             None => "",
         };
-        let degree = observation.degree.map_or(String::new(), |degree| degree.to_string());
+        let degree = observation.ways.map_or(String::new(), |ways| ways.count().to_string());
         let radius_mm = observation.fingerprint.radius_mm().to_string();
         writer.write_record([&step.to_string(), &radius_mm, turn, &degree])?;
     }

@@ -3,7 +3,7 @@
 use super::{environment::Environment, walk::PathRng};
 use rand::RngExt;
 use std::{fmt, str::FromStr};
-use toposlam::Turn;
+use toposlam::Exit;
 
 /// Probability that a reported degree is right. Otherwise it is one too small or one too large, equally often.
 const RIGHT_DEGREE: f64 = 0.9;
@@ -28,7 +28,7 @@ pub struct Hints {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Hint {
     /// How the robot left the previous place.
-    pub turn: Option<Turn>,
+    pub turn: Option<Exit>,
     /// Degree of the place, 1 to 7.
     pub degree: Option<u8>,
 }
@@ -114,7 +114,7 @@ impl Hints {
             Hint {
                 turn: turn.map(|before| {
                     let back = (walk[before] == walk[step]) != (turn_wrong < self.wrong);
-                    if back { Turn::Back } else { Turn::On }
+                    if back { Exit::Back } else { Exit::On }
                 }),
                 degree: (self.degree && degree_missing >= self.missing).then(|| told_degree(degree, degree_noise)),
             }
@@ -164,7 +164,7 @@ mod tests {
         let (walk, hints) = draw("turn", 1);
         assert_eq!([hints[0], hints[1]], [Hint::default(); 2]);
         for (places, hint) in walk.windows(3).zip(&hints[2..]) {
-            let turn = if places[0] == places[2] { Turn::Back } else { Turn::On };
+            let turn = if places[0] == places[2] { Exit::Back } else { Exit::On };
             assert_eq!(*hint, Hint { turn: Some(turn), degree: None });
         }
     }

@@ -23,7 +23,7 @@
 use toposlam::place::Place;
 use toposlam::reference::{self, PaperReference, VERTICES};
 use toposlam::ring::{RingFrame, RingGeometry};
-use toposlam::{ConfigError, FaultCounters, Filter, Map, Mapper, MapperConfig, Turn, Update};
+use toposlam::{ConfigError, FaultCounters, Filter, Map, Mapper, MapperConfig, Passage, Update};
 
 use toposlam_sim::Step;
 use toposlam_sim::exploration::Exploration;
@@ -46,7 +46,7 @@ pub enum FilterChoice {
 /// The robot's stages with either filter, for a ring of `SONARS`. It is used as a trait object, so that users of a
 /// mapping do not compile the filters again.
 trait Stages<const SONARS: usize> {
-    fn observe(&mut self, frame: &RingFrame<SONARS>, turn: Option<Turn>) -> Option<(Place, Update)>;
+    fn observe(&mut self, frame: &RingFrame<SONARS>, passage: Passage) -> Option<(Place, Update)>;
     fn map(&self) -> &Map<VERTICES>;
     fn faults(&self) -> FaultCounters;
     /// The vertices of the newest places.
@@ -57,8 +57,8 @@ trait Stages<const SONARS: usize> {
 struct Robust<const SONARS: usize>(Box<Mapper<SONARS, VERTICES, reference::Filter>>);
 
 impl<const SONARS: usize> Stages<SONARS> for Robust<SONARS> {
-    fn observe(&mut self, frame: &RingFrame<SONARS>, turn: Option<Turn>) -> Option<(Place, Update)> {
-        self.0.observe(frame, turn)
+    fn observe(&mut self, frame: &RingFrame<SONARS>, passage: Passage) -> Option<(Place, Update)> {
+        self.0.observe(frame, passage)
     }
 
     fn map(&self) -> &Map<VERTICES> {
@@ -78,9 +78,9 @@ impl<const SONARS: usize> Stages<SONARS> for Robust<SONARS> {
 struct Paper<const SONARS: usize>(Box<Mapper<SONARS, VERTICES, PaperReference>>, Ancestry);
 
 impl<const SONARS: usize> Stages<SONARS> for Paper<SONARS> {
-    fn observe(&mut self, frame: &RingFrame<SONARS>, turn: Option<Turn>) -> Option<(Place, Update)> {
+    fn observe(&mut self, frame: &RingFrame<SONARS>, passage: Passage) -> Option<(Place, Update)> {
         let Self(mapper, ancestry) = self;
-        let observed = mapper.observe(frame, turn)?;
+        let observed = mapper.observe(frame, passage)?;
         let particles = mapper.filter().particles().iter();
         ancestry.advance(particles.map(|particle| (particle.parent.into(), particle.at.into())));
         Some(observed)
@@ -136,10 +136,10 @@ impl<const SONARS: usize> Mapping<SONARS> {
         Ok(Self { stages, steps: Vec::new() })
     }
 
-    /// Processes one frame and, as far as the drive knows it, how the robot left the previous place. Returns a step
-    /// when a place was detected.
-    pub fn observe(&mut self, frame: &RingFrame<SONARS>, turn: Option<Turn>) -> Option<Step> {
-        let (place, update) = self.stages.observe(frame, turn)?;
+    /// Processes one frame and what the drive knows of the way from the previous place. Returns a step when a place was
+    /// detected.
+    pub fn observe(&mut self, frame: &RingFrame<SONARS>, passage: Passage) -> Option<Step> {
+        let (place, update) = self.stages.observe(frame, passage)?;
         let map = self.map();
         let step = Step { place, update, vertices: map.vertices().len() as u8, edges: map.edges().count() };
         self.steps.push(step);

@@ -10,7 +10,7 @@ use super::{
     walk::{Walk, draw_walk, observe, path_rng, quantise},
 };
 use rand::{Rng, seq::SliceRandom};
-use toposlam::{Fingerprint, Observation};
+use toposlam::{Fingerprint, Observation, Ways};
 
 /// A visited place and the robot's observation of it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -72,7 +72,8 @@ impl<'a> Trial<'a> {
             let visit = |((&place, fingerprint), hint): ((&usize, Fingerprint), Hint)| {
                 let fingerprint = quantise(fingerprint, settings.fingerprint_bits);
                 let Hint { turn, degree } = hint;
-                Visit { place, observation: Observation { turn, degree, ..Observation::new(fingerprint) } }
+                let ways = degree.and_then(|degree| Ways::from_count(degree).ok());
+                Visit { place, observation: Observation { exit: turn, ways, ..Observation::new(fingerprint) } }
             };
             begin(walk.iter().zip(fingerprints).zip(hints).map(visit).collect())
         };
@@ -123,7 +124,7 @@ impl<'a> Trial<'a> {
 
 /// Visits as an independent sequence: the first place has no predecessor, and turns start at the third place.
 fn begin(mut visits: Vec<Visit>) -> Vec<Visit> {
-    visits.iter_mut().take(2).for_each(|visit| visit.observation.turn = None);
+    visits.iter_mut().take(2).for_each(|visit| visit.observation.exit = None);
     visits.iter_mut().take(1).for_each(|visit| visit.observation.starts_sequence = true);
     visits
 }
@@ -189,7 +190,7 @@ mod tests {
             for sequence in trial.ngrams.iter().chain([&trial.visits]) {
                 let starts = sequence.iter().map(|visit| visit.observation.starts_sequence);
                 assert!(starts.eq((0..sequence.len()).map(|step| step == 0)));
-                let turns = sequence.iter().map(|visit| visit.observation.turn.is_some());
+                let turns = sequence.iter().map(|visit| visit.observation.exit.is_some());
                 assert!(turns.eq((0..sequence.len()).map(|step| step >= 2)));
             }
             let places = |trial: &Trial| -> Vec<Vec<usize>> {

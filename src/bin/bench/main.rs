@@ -17,7 +17,7 @@ use costs::Costs;
 use defmt_rtt as _;
 use static_cell::ConstStaticCell;
 use toposlam::{
-    FaultCounters, Filter as _, Fingerprint, Observation, RobustConfig, RobustFilter, Turn, Update,
+    Exit, FaultCounters, Filter as _, Fingerprint, Observation, RobustConfig, RobustFilter, Update,
     drive::{Drive, VelocityCommand},
     persist::Persist,
     persist::snapshot::Writer,
@@ -66,7 +66,7 @@ enum Hints {
     /// The radius only.
     Radius,
     /// Radius and turn.
-    Turn,
+    Exit,
     /// Radius, turn and degree.
     TurnAndDegree,
 }
@@ -74,8 +74,8 @@ enum Hints {
 fn observation(radius_mm: u16, [turn, degree]: [u8; 2], hints: Hints) -> Observation {
     let Ok(fingerprint) = Fingerprint::from_radius_mm(radius_mm) else { panic!() };
     let turn = match turn {
-        b'b' if hints != Hints::Radius => Some(Turn::Back),
-        b'o' if hints != Hints::Radius => Some(Turn::On),
+        b'b' if hints != Hints::Radius => Some(Exit::Back),
+        b'o' if hints != Hints::Radius => Some(Exit::On),
         _ => None,
     };
     let degree = Some(degree - b'0').filter(|&degree| degree > 0 && hints == Hints::TurnAndDegree);
@@ -247,7 +247,7 @@ fn main() -> ! {
     if let Filters::Robot(filter) = filters {
         run(clock, filter, reference::FILTER, Hints::Radius, (costs, refinements), |_, _| {});
         refinements.print("robust_instructions_per_refinement");
-        run(clock, filter, reference::FILTER, Hints::Turn, (turn_costs, refinements), |_, _| {});
+        run(clock, filter, reference::FILTER, Hints::Exit, (turn_costs, refinements), |_, _| {});
         refinements.print("robust_turn_instructions_per_refinement");
         let report = |filter: &Filter, update: &Update| wire.report(clock, filter, update);
         run(clock, filter, reference::FILTER, Hints::TurnAndDegree, (both_costs, refinements), report);
@@ -264,7 +264,7 @@ fn main() -> ! {
     let stack_bytes = shared::stack_high_water_bytes();
     *filters = const { Filters::Large(LargeFilter::new()) };
     if let Filters::Large(filter) = filters {
-        run(clock, filter, LARGE_FILTER, Hints::Turn, (large_costs, refinements), |_, _| {});
+        run(clock, filter, LARGE_FILTER, Hints::Exit, (large_costs, refinements), |_, _| {});
     }
 
     hprintln!("places: {}", PLACES_MM.len());

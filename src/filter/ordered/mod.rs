@@ -18,7 +18,7 @@ mod replay;
 mod tests;
 
 pub use config::OrderedConfig;
-pub use observation::{OrderedObservation, WaysError, WaysSeen};
+pub use observation::{OrderedObservation, WaysSeen};
 
 use crate::config_error::ConfigError;
 use crate::map::darts::DartMap;

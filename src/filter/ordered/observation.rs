@@ -1,6 +1,7 @@
 //! What the ordered filter hears of one place: the radius, the ways seen, how the robot left the place before, and how long it
 //! drove.
 
+use crate::filter::WaysError;
 use crate::map::darts::{Bearing, WAYS};
 use crate::place::Fingerprint;
 
@@ -11,27 +12,6 @@ pub struct WaysSeen {
     count: u8,
     others: [u8; WAYS - 1],
 }
-
-/// Why ways cannot be what a robot saw.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[non_exhaustive]
-pub enum WaysError {
-    /// There are more ways than a vertex can have.
-    TooMany,
-    /// A bearing is not between 0 and a full turn, or not larger than the one before.
-    NotAscending,
-}
-
-impl core::fmt::Display for WaysError {
-    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
-        f.write_str(match self {
-            Self::TooMany => "more than 7 ways",
-            Self::NotAscending => "bearings are not ascending within a full turn",
-        })
-    }
-}
-
-impl core::error::Error for WaysError {}
 
 /// A full turn in milliradians, rounded down.
 const TURN_MRAD: u32 = 6283;

@@ -259,7 +259,7 @@ fn copy<H: Clone>(slots: &mut [H], from: usize, to: usize) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::filter::{Observation, RobustConfig};
+    use crate::filter::{Observation, RobustConfig, Ways};
     use crate::place::Fingerprint;
     use std::collections::BTreeSet;
 
@@ -283,7 +283,11 @@ mod tests {
         for index in 0..32 {
             let steps = 500 + 60 * (index as u16 * 7 % 4) + index as u16 % 5;
             let observation = Observation::new(Fingerprint::from_steps(steps).unwrap());
-            history.push(&Observation { starts_sequence: index % 12 == 0, degree: Some(2), ..observation });
+            history.push(&Observation {
+                starts_sequence: index % 12 == 0,
+                ways: Ways::from_count(2).ok(),
+                ..observation
+            });
             let observation = history.get(index).unwrap();
             beam.grow(&model, &history, (index, observation), WANTED, false);
             check(&beam);

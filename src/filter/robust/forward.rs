@@ -6,7 +6,7 @@ use super::hmm::{Emissions, Hmm};
 use super::hypothesis::Hypothesis;
 use super::lattice::{Cells, Lattice, Semiring, Stage};
 use super::model::{Model, OTHER_PATHS_SHARE};
-use crate::filter::Turn;
+use crate::filter::Exit;
 use crate::map::{PerVertex, VertexId, VertexSet32};
 
 /// The product of the normalisers is turned into a logarithm below this.
@@ -151,7 +151,7 @@ impl<const V: usize> Semiring for AllPaths<'_, V> {
         probability
     }
 
-    fn turns(&mut self, hint: Option<Turn>) -> [f32; 2] {
+    fn turns(&mut self, hint: Option<Exit>) -> [f32; 2] {
         let [ln_on, ln_back] = [self.model.ln_turn(hint, false), self.model.ln_turn(hint, true)];
         let ln_exit = self.before.map_or(0.0, |before| self.hmm.ln_exit(before));
         self.ln_path += ln_exit + if self.earlier == Some(self.now) { ln_back } else { ln_on };

@@ -167,6 +167,6 @@ impl<const V: usize, const T: usize> Hypothesis<V, T> {
             1 => self.before,
             _ => self.vertex_of(index - 2),
         };
-        model.ln_turn(observation.turn(), second_last.is_some() && second_last == vertex)
+        model.ln_turn(observation.exit(), second_last.is_some() && second_last == vertex)
     }
 }

@@ -1,13 +1,13 @@
 //! The history: the newest observations, packed. Every hypothesis explains all of them.
 
-use crate::filter::{Observation, Turn};
+use crate::filter::{Exit, Observation};
 use crate::place::Fingerprint;
 
 /// The largest degree; a larger one counts as this.
 pub(crate) const DEGREE_MAX: u8 = 7;
 
-const TURN_BACK: u8 = 1;
-const TURN_ON: u8 = 2;
+const EXIT_BACK: u8 = 1;
+const EXIT_ON: u8 = 2;
 const DEGREE_SHIFT: u8 = 2;
 const STARTS_SEQUENCE: u8 = 1 << 5;
 const KIDNAPPED: u8 = 1 << 6;
@@ -16,7 +16,7 @@ const KIDNAPPED: u8 = 1 << 6;
 #[derive(Clone, Debug)]
 pub(crate) struct ObservationHistory<const T: usize> {
     pub(crate) steps: [u16; T],
-    /// Bits 0 and 1: the turn hint. Bits 2 to 4: the degree. Bit 5: the first place of a sequence. Bit 6: the robot seems to
+    /// Bits 0 and 1: the exit. Bits 2 to 4: the degree. Bit 5: the first place of a sequence. Bit 6: the robot seems to
     /// have been kidnapped on the way here.
     pub(crate) hints: [u8; T],
     pub(crate) len: usize,
@@ -31,16 +31,16 @@ pub(crate) struct PackedObservation {
 
 impl PackedObservation {
     pub(crate) fn new(observation: &Observation) -> Self {
-        let turn = match observation.turn {
+        let exit = match observation.exit {
             None => 0,
-            Some(Turn::Back) => TURN_BACK,
-            Some(Turn::On) => TURN_ON,
+            Some(exit) if exit.is_back() => EXIT_BACK,
+            Some(_) => EXIT_ON,
         };
-        let degree = observation.degree.unwrap_or(0).min(DEGREE_MAX);
+        let degree = observation.degree().min(DEGREE_MAX);
         let start = if observation.starts_sequence { STARTS_SEQUENCE } else { 0 };
         Self {
             steps: observation.fingerprint.steps().min(Fingerprint::MAX.steps()),
-            hints: turn | degree << DEGREE_SHIFT | start,
+            hints: exit | degree << DEGREE_SHIFT | start,
         }
     }
 
@@ -49,11 +49,11 @@ impl PackedObservation {
         self.hints & (STARTS_SEQUENCE | KIDNAPPED) != 0
     }
 
-    /// The turn hint.
-    pub(crate) const fn turn(self) -> Option<Turn> {
+    /// The exit by which the robot left the place before: [`Exit::Back`] or [`Exit::On`].
+    pub(crate) const fn exit(self) -> Option<Exit> {
         match self.hints & 3 {
-            TURN_BACK => Some(Turn::Back),
-            TURN_ON => Some(Turn::On),
+            EXIT_BACK => Some(Exit::Back),
+            EXIT_ON => Some(Exit::On),
             _ => None,
         }
     }
@@ -61,7 +61,7 @@ impl PackedObservation {
     /// Whether an observation can have these hints.
     #[cfg(feature = "snapshot")]
     pub(crate) const fn is_possible(hints: u8) -> bool {
-        hints & 3 <= TURN_ON && hints < 1 << 7
+        hints & 3 <= EXIT_ON && hints < 1 << 7
     }
 
     /// The degree, 1 to [`DEGREE_MAX`]; 0 when it is unknown.
@@ -122,9 +122,9 @@ impl<const T: usize> ObservationHistory<T> {
         }
     }
 
-    /// Whether the vertex of the next observation depends on that of this one alone: the next one has no turn hint.
+    /// Whether the vertex of the next observation depends on that of this one alone: the next one has no exit.
     pub(crate) fn is_first_order(&self, index: usize) -> bool {
-        self.get(index + 1).is_some_and(|next| next.turn().is_none() && !next.starts_sequence())
+        self.get(index + 1).is_some_and(|next| next.exit().is_none() && !next.starts_sequence())
     }
 
     /// All observations, the oldest first.
@@ -137,19 +137,20 @@ impl<const T: usize> ObservationHistory<T> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::filter::Ways;
 
     #[test]
     fn packed_observations_round_trip() {
         let mut history = ObservationHistory::<8>::new();
-        let turns = [None, Some(Turn::Back), Some(Turn::On)];
-        for (steps, turn) in [0, 1, Fingerprint::MAX.steps()].into_iter().zip(turns) {
-            for (degree, kept) in [(None, 0), (Some(0), 0), (Some(1), 1), (Some(7), 7), (Some(8), 7), (Some(255), 7)] {
+        let exits = [None, Some(Exit::Back), Some(Exit::On)];
+        for (steps, exit) in [0, 1, Fingerprint::MAX.steps()].into_iter().zip(exits) {
+            for (ways, kept) in [(None, 0), (Ways::from_count(1).ok(), 1), (Ways::from_count(7).ok(), 7)] {
                 for starts_sequence in [false, true] {
                     let fingerprint = Fingerprint::from_steps(steps).unwrap();
                     history.clear();
-                    history.push(&Observation { fingerprint, turn, degree, starts_sequence });
+                    history.push(&Observation { ways, exit, starts_sequence, ..Observation::new(fingerprint) });
                     let packed = history.get(0).unwrap();
-                    assert_eq!((packed.steps, packed.turn()), (steps, turn));
+                    assert_eq!((packed.steps, packed.exit()), (steps, exit));
                     assert_eq!((packed.degree(), packed.starts_sequence()), (kept, starts_sequence));
                     assert_eq!(history.get(1), None);
                 }

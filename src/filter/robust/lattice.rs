@@ -9,7 +9,7 @@ use super::column::{Column, PerSlot, Slot, State, WIDTH};
 use super::history::{ObservationHistory, PackedObservation};
 use super::hmm::Hmm;
 use super::model::Model;
-use crate::filter::Turn;
+use crate::filter::Exit;
 use crate::map::{VertexId, VertexSet32};
 
 /// A value for each pair of a slot in the column before and one in this column.
@@ -49,7 +49,7 @@ pub(super) trait Semiring {
     fn start(&mut self, closed: f32, from: Option<VertexId>, slot: Slot, state: &State) -> f32;
 
     /// The weights of a transition that does not turn back, and of one that does.
-    fn turns(&mut self, hint: Option<Turn>) -> [f32; 2];
+    fn turns(&mut self, hint: Option<Exit>) -> [f32; 2];
 
     /// All paths into a slot of the column before; `None` when there is none. `rows` of the cells are in use; the slots before
     /// do not matter when `is_first_order`.
@@ -123,7 +123,7 @@ impl Lattice {
                     next[Slot::FIRST][slot] = semiring.start(closed, from, slot, state);
                 }
             } else {
-                let hint = if is_second { None } else { observation.turn() };
+                let hint = if is_second { None } else { observation.exit() };
                 let turns = semiring.turns(hint);
                 // Where the paths come from that turn back to a vertex.
                 let mut back = PerSlot([None; WIDTH]);

@@ -5,7 +5,7 @@ use super::config::RobustConfig;
 use super::history::DEGREE_MAX;
 use super::special_functions::{HALF_LN_2_PI, ln_gamma};
 use super::statistics::VertexStatistics;
-use crate::filter::Turn;
+use crate::filter::Exit;
 use crate::place::Fingerprint;
 
 /// R: the range of labels over which the mean of a vertex is uniform a priori, in steps (2 m).
@@ -153,12 +153,12 @@ impl Model {
     }
 
     /// ln P of a turn hint: `ln(1 − ε)` when it agrees with the path, `ln ε` when it does not, 0 without a hint.
-    pub(crate) fn ln_turn(&self, hint: Option<Turn>, turned_back: bool) -> f32 {
+    pub(crate) fn ln_turn(&self, hint: Option<Exit>, turned_back: bool) -> f32 {
         let [right, wrong] = self.turn;
         match hint {
             None => 0.0,
             Some(hint) => {
-                if (hint == Turn::Back) == turned_back {
+                if (hint == Exit::Back) == turned_back {
                     right
                 } else {
                     wrong

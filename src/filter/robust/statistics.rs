@@ -91,13 +91,13 @@ impl VertexStatistics {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::filter::Observation;
+    use crate::filter::{Observation, Ways};
 
     fn statistics(visits: impl IntoIterator<Item = (u16, u8)>) -> VertexStatistics {
         let mut statistics = VertexStatistics::NONE;
         for (steps, degree) in visits {
             let fingerprint = Fingerprint::from_steps(steps).unwrap();
-            let observation = Observation { degree: Some(degree), ..Observation::new(fingerprint) };
+            let observation = Observation { ways: Ways::from_count(degree).ok(), ..Observation::new(fingerprint) };
             statistics.include(PackedObservation::new(&observation));
         }
         statistics

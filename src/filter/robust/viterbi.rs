@@ -6,7 +6,7 @@ use super::hmm::Hmm;
 use super::hypothesis::{Hypothesis, ln};
 use super::lattice::{Cells, Lattice, Semiring, Stage};
 use super::model::{Model, NEW_EDGE_COST};
-use crate::filter::Turn;
+use crate::filter::Exit;
 use crate::map::{VertexId, VertexSet32};
 use rand_core::Rng;
 use rand_xoshiro::Xoshiro128PlusPlus;
@@ -191,7 +191,7 @@ impl<const V: usize> Semiring for BestPath<'_, V> {
         closed + state.ln_emission + ln_transition
     }
 
-    fn turns(&mut self, hint: Option<Turn>) -> [f32; 2] {
+    fn turns(&mut self, hint: Option<Exit>) -> [f32; 2] {
         self.next_origins = PerSlot([Slot::FIRST; WIDTH]);
         [self.model.ln_turn(hint, false), self.model.ln_turn(hint, true)]
     }

@@ -42,6 +42,13 @@ pub enum Factors {
         /// Eq. 9: the penalty for similar vertices.
         ln_size_q16: i32,
     },
+    /// The factors of an [`OrderedFilter`](crate::OrderedFilter).
+    Ordered {
+        /// The evidence of the observed labels, with the means and variances of the vertices integrated out.
+        ln_labels_q16: i32,
+        /// The evidence of exits, ways, travel times and closures, and the prior of the map.
+        ln_moves_q16: i32,
+    },
 }
 
 impl From<WeightFactors> for Factors {
@@ -52,6 +59,9 @@ impl From<WeightFactors> for Factors {
                 ln_moves_q16: factors.ln_moves_q16,
                 ln_size_q16: factors.ln_size_q16,
             },
+            WeightFactors::Ordered(factors) => {
+                Self::Ordered { ln_labels_q16: factors.ln_labels_q16, ln_moves_q16: factors.ln_moves_q16 }
+            }
             WeightFactors::Paper(factors) => Self::Paper {
                 ln_label_q16: factors.ln_label_q16,
                 ln_consistency_q16: factors.ln_consistency_q16,

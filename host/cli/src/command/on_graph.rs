@@ -2,6 +2,7 @@
 //! drive.
 
 use clap::{Args, ValueEnum};
+use toposlam::Passage;
 use toposlam_cli::progress::Progress;
 use toposlam_eval::mapping::Mapping;
 use toposlam_sim::world::{GroundTruth, Simulation};
@@ -43,7 +44,9 @@ pub(super) fn run(drive: &DriveArguments, options: &OnGraph, places: usize, fram
         let Some((frame, truth)) = simulation.next() else { break };
         driven += 1;
         ground_truth.drive(&truth);
-        if let Some(step) = mapping.observe(&frame, truth.turn.filter(|_| options.hints == Hints::Turn)) {
+        if let Some(step) =
+            mapping.observe(&frame, if options.hints == Hints::Turn { truth.passage() } else { Passage::UNKNOWN })
+        {
             ground_truth.detect(&step.place);
             progress.println(step);
             progress.increment();

@@ -6,7 +6,7 @@ use std::path::PathBuf;
 
 use anyhow::Context;
 use clap::Args;
-use toposlam::{Map, reference};
+use toposlam::{Map, Passage, reference};
 use toposlam_eval::faults::fault_lines;
 use toposlam_eval::graph::Graph;
 use toposlam_eval::gvg_adherence::GvgAdherence;
@@ -47,7 +47,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     // A smaller ring leaves slots of the frame without a sensor; they are dead in every frame.
     let mut mapping = Mapping::of_recording(&ring, arguments.filter.into())?;
     for frame in &frames {
-        if let Some(step) = mapping.observe(frame, None) {
+        if let Some(step) = mapping.observe(frame, Passage::UNKNOWN) {
             println!("{step}");
         }
     }

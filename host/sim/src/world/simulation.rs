@@ -5,8 +5,8 @@ use std::f64::consts::PI;
 use rand::{RngExt, SeedableRng};
 use rand_distr::{Distribution, StandardNormal};
 use rand_xoshiro::Xoshiro256PlusPlus;
-use toposlam::Turn;
 use toposlam::ring::RingFrame;
+use toposlam::{Exit, Passage};
 
 use super::ray_casting::{SONARS, Scene, SonarModel, wrapped};
 use super::{Plan, Point, TrueEdge, TrueMap, VoronoiError};
@@ -38,7 +38,14 @@ pub struct Truth {
     pub node: Option<usize>,
     /// How the robot left the node before the nearest one: it turned back or drove on. The drive knows this without
     /// odometry. `None` when the robot has not visited a node before.
-    pub turn: Option<Turn>,
+    pub turn: Option<Exit>,
+}
+
+impl Truth {
+    /// What a drive knows of the way from the node before.
+    pub const fn passage(&self) -> Passage {
+        Passage { exit: self.turn, ..Passage::UNKNOWN }
+    }
 }
 
 /// Motion and sonars of the robot. Speeds, rates and times must be above 0.
@@ -120,7 +127,7 @@ pub struct Simulation {
     leg: usize,
     driven_mm: f64,
     /// How the robot left the last node, and the one before that.
-    turns: [Option<Turn>; 2],
+    turns: [Option<Exit>; 2],
     heading_rad: f64,
     at_node: Option<usize>,
     sideways: Drift,
@@ -216,7 +223,7 @@ impl Simulation {
     }
 
     /// How the robot left the node before the nearer end of its edge.
-    fn turn(&self) -> Option<Turn> {
+    fn turn(&self) -> Option<Exit> {
         let length_mm = |way: &[Point]| way.windows(2).map(|ends| ends[0].distance_mm(ends[1])).sum::<f64>();
         let driven_mm = length_mm(&self.way[..=self.leg]) + self.driven_mm;
         self.turns[usize::from(2.0 * driven_mm < length_mm(&self.way))]
@@ -244,7 +251,7 @@ impl Simulation {
         let TrueEdge { nodes, way } = &self.map.edges[edge];
         self.way = if reversed { way.iter().rev().copied().collect() } else { way.clone() };
         self.target = nodes[usize::from(!reversed)];
-        self.turns = [Some(if turn_back { Turn::Back } else { Turn::On }), self.turns[0]];
+        self.turns = [Some(if turn_back { Exit::Back } else { Exit::On }), self.turns[0]];
         self.edge = edge;
         self.reversed = reversed;
         self.leg = 0;
