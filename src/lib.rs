@@ -17,7 +17,7 @@
 //!
 //! ```
 //! use toposlam::ring::{Echo, RingFrame, RingGeometry};
-//! use toposlam::{Mapper, MapperConfig, RobustFilter};
+//! use toposlam::{Mapper, MapperConfig, Passage, RobustFilter};
 //!
 //! /// The frame of a ring of 16 sensors in a corridor that ends ahead.
 //! fn frame(half_width_mm: u16, ahead_mm: u16) -> RingFrame<16> {
@@ -35,7 +35,7 @@
 //! for half_width_mm in [800, 1200, 800, 1200, 800] {
 //!     for step in -50_i16..=50 {
 //!         let ahead_mm = half_width_mm + 30 * step.unsigned_abs();
-//!         if let Some((place, update)) = mapper.observe(&frame(half_width_mm, ahead_mm), None) {
+//!         if let Some((place, update)) = mapper.observe(&frame(half_width_mm, ahead_mm), Passage::UNKNOWN) {
 //!             println!("{} mm: vertex {}", place.fingerprint.radius_mm(), update.vertex);
 //!         }
 //!     }
