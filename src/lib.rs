@@ -123,7 +123,7 @@
 //! | Eq. 6, the weight | `filter/paper/particle.rs` |
 //! | Eq. 7 to 9, its factors | `filter/paper/likelihood.rs` |
 //! | Section III.B, localisation | `filter/mod.rs` ([`Update::vertex`]) |
-//! | Eq. 2, the half from history to map, with its n-gram | `filter/robust/worst_ngram.rs` |
+//! | Eq. 2, the half from history to map, with its n-gram | `filter/worst_ngram.rs` |
 //! | Section IV.A, meet points | `place/` |
 #![cfg_attr(not(test), no_std)]
 #![forbid(unsafe_code)]

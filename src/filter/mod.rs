@@ -5,7 +5,9 @@ mod observation;
 mod ordered;
 mod paper;
 pub(crate) mod robust;
+mod vertex_ids;
 mod ways;
+mod worst_ngram;
 
 pub use interface::{Filter, FilterCapacities};
 pub use observation::{Observation, Passage};

@@ -7,7 +7,6 @@ mod hypothesis;
 mod parts;
 
 use crate::fault::FaultCounters;
-use crate::filter::robust::worst_ngram;
 use crate::filter::{RobustConfig, RobustFilter};
 use crate::persist::Persist;
 use crate::persist::snapshot::{FILTER_SECTION, FRAME_BYTES, Reader, SnapshotError, Writer};
@@ -136,7 +135,7 @@ impl<const N: usize, const V: usize, const HISTORY: usize> RobustFilter<N, V, HI
             }
         }
         if kept {
-            self.worst = worst_ngram::worst_ngram(&self.history, &self.map, &self.vertex_ids.path);
+            self.worst = self.find_worst_ngram();
         }
         from.finish()
     }
