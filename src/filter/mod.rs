@@ -11,7 +11,7 @@ mod worst_ngram;
 
 pub use interface::{Filter, FilterCapacities};
 pub use observation::{Observation, Passage};
-pub use ordered::{OrderedConfig, OrderedFilter, OrderedObservation, WaysSeen};
+pub use ordered::{OrderedConfig, OrderedFilter};
 pub use paper::{
     Consistency, Direction, Evidence, History, Ngram, NgramError, NgramLength, NgramTable, NgramsFull, PaperConfig,
     PaperFilter, Particle, Prior,
