@@ -43,7 +43,7 @@ impl OrderedConfig {
     };
 
     /// What a filter holds before it is started: all zero.
-    pub(super) const UNSET: Self = Self {
+    pub(crate) const UNSET: Self = Self {
         noise_mm: 0,
         wrong_exit_permille: 0,
         missed_way_permille: 0,
