@@ -128,6 +128,11 @@ impl<const N: usize, const V: usize, const D: usize, const T: usize> OrderedFilt
         self.observed
     }
 
+    /// Publishes the best map without another place: the result of [`Filter::refine`] so far.
+    pub fn refresh(&mut self) -> Update {
+        self.publish()
+    }
+
     /// Takes hints that contradict the place before out of an observation, and records the faults.
     fn checked(&mut self, mut observation: Observation) -> Observation {
         if observation.travel_frames == Some(0) {
