@@ -208,9 +208,14 @@ impl Model {
         libm::logf(part / whole)
     }
 
+    /// ln P that none of `looks` visits has shown a way.
+    pub(super) fn way_unseen(&self, looks: u8) -> f32 {
+        (f32::from(looks) * self.missed).max(self.false_way)
+    }
+
     /// ln of the density of seeing a way that none of `looks` visits has shown.
     pub(super) fn way_new(&self, looks: u8) -> f32 {
-        (f32::from(looks) * self.missed).max(self.false_way) - LN_CIRCLE
+        self.way_unseen(looks) - LN_CIRCLE
     }
 
     /// ln of the density of a travel time on an edge that was driven `timed` times.
