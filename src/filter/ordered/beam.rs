@@ -133,7 +133,8 @@ impl<const N: usize, const V: usize, const D: usize, const T: usize> Beam<N, V, 
                 }
             });
         }
-        let mut lacks_room = chosen.first().is_none_or(|best| missed > best.score);
+        let mut lacks_room =
+            chosen.first().is_none_or(|best| missed > best.score || best.choice.target == Target::OffMap);
         if count == 0 {
             return true;
         }
