@@ -4,6 +4,7 @@
 
 mod drive;
 mod mapper;
+mod ordered_filter;
 mod paper_filter;
 mod robust_filter;
 pub mod snapshot;
