@@ -4,6 +4,7 @@
 
 mod drive;
 mod mapper;
+mod paper_filter;
 mod robust_filter;
 pub mod snapshot;
 #[cfg(feature = "store")]
@@ -53,17 +54,7 @@ use snapshot::{Reader, SnapshotError, Writer};
 /// # Ok::<(), SnapshotError>(())
 /// ```
 ///
-/// [`RobustFilter`](crate::RobustFilter) and [`Drive`](crate::drive::Drive) implement it, [`PaperFilter`](crate::PaperFilter)
-/// does not:
-///
-/// ```compile_fail,E0277
-/// use toposlam::persist::snapshot::Writer;
-/// use toposlam::reference::PaperReference;
-///
-/// let mut buffer = [0; 64];
-/// let mut writer = Writer::new(&mut buffer).unwrap();
-/// writer.stage(&mut PaperReference::new());
-/// ```
+/// Every filter and the [`Drive`](crate::drive::Drive) implement it.
 pub trait Persist {
     /// The tag of the section. The library uses tags below 128.
     const SECTION: u8;

@@ -7,14 +7,10 @@ mod hypothesis;
 mod parts;
 
 use crate::fault::FaultCounters;
-use crate::filter::robust::worst_ngram;
 use crate::filter::{RobustConfig, RobustFilter};
 use crate::persist::Persist;
-use crate::persist::snapshot::{FILTER_SECTION, FRAME_BYTES, Reader, SnapshotError, Writer};
+use crate::persist::snapshot::{FILTER_SECTION, FRAME_BYTES, ROBUST, Reader, SnapshotError, Writer};
 use parts::{STATISTICS_BYTES, path_bytes, row_bytes};
-
-/// The first byte of the filter's section: the kind of filter.
-const ROBUST: u8 = 1;
 
 /// Bounds of the noise scale 2 σ², in steps².
 const SCALES: core::ops::RangeInclusive<f32> = 0.1..=1e6;
@@ -136,7 +132,7 @@ impl<const N: usize, const V: usize, const HISTORY: usize> RobustFilter<N, V, HI
             }
         }
         if kept {
-            self.worst = worst_ngram::worst_ngram(&self.history, &self.map, &self.vertex_ids.path);
+            self.worst = self.find_worst_ngram();
         }
         from.finish()
     }

@@ -24,5 +24,5 @@ pub use message::{
 pub use navigation::{GoalState, GoalStatus, Velocity};
 pub use payload::Payload;
 pub use reply::{Info, Outcome, Refusal, Reply, Version};
-pub use setting::{Setting, Settings};
+pub use setting::{FilterSettings, Setting, Settings};
 pub use ways::{Exploration, VertexWays, Way, WayId};
