@@ -4,7 +4,7 @@ use core::hint::black_box;
 
 use static_cell::ConstStaticCell;
 use toposlam::{
-    ConfigError, FaultCounters,
+    ConfigError, FaultCounters, Filter,
     persist::snapshot::{Resume, Snapshot, SnapshotError, SnapshotPolicy, Writer},
     reference,
     wire::{Reporter, map_digest},
