@@ -17,6 +17,7 @@
 
 pub mod paper;
 pub mod robust;
+pub mod small;
 
 #[cfg(feature = "snapshot")]
 pub use robust::SNAPSHOT_BYTES;

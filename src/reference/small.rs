@@ -1,0 +1,30 @@
+//! The small robot: a ring of eight sensors, and capacities for a microcontroller with 16 KiB of RAM.
+
+use crate::filter::{RobustConfig, RobustFilter};
+use crate::ring::RingGeometry;
+#[cfg(feature = "wire")]
+use crate::robot::{Robot, RobotConfig};
+
+/// The number of sensors in the ring.
+pub const SONARS: usize = 8;
+/// The most hypotheses.
+pub const HYPOTHESES: usize = 3;
+/// The most vertices of a map.
+pub const VERTICES: usize = 16;
+/// The most observations in the history.
+pub const HISTORY: usize = 64;
+
+/// Eight sensors 45° apart, counter-clockwise from straight ahead.
+pub const RING: RingGeometry<SONARS> = RingGeometry::even();
+
+/// The filter.
+pub type Filter = RobustFilter<HYPOTHESES, VERTICES, HISTORY>;
+/// The settings of the filter.
+pub const FILTER: RobustConfig = RobustConfig { hypotheses: HYPOTHESES as u8, ..RobustConfig::DEFAULT };
+
+/// The robot.
+#[cfg(feature = "wire")]
+pub type SmallRobot<'buffer> = Robot<'buffer, SONARS, VERTICES, Filter>;
+/// The settings of the robot.
+#[cfg(feature = "wire")]
+pub const ROBOT: RobotConfig<SONARS, RobustConfig> = RobotConfig::new(RING, FILTER);
