@@ -1,6 +1,6 @@
 //! The small robot: a ring of eight sensors, and capacities for a microcontroller with 16 KiB of RAM.
 
-use crate::filter::{RobustConfig, RobustFilter};
+use crate::filter::{OrderedConfig, OrderedFilter};
 use crate::ring::RingGeometry;
 #[cfg(feature = "wire")]
 use crate::robot::{Robot, RobotConfig};
@@ -11,6 +11,8 @@ pub const SONARS: usize = 8;
 pub const HYPOTHESES: usize = 3;
 /// The most vertices of a map.
 pub const VERTICES: usize = 16;
+/// The most ways of all vertices of a map.
+pub const WAYS: usize = 44;
 /// The most observations in the history.
 pub const HISTORY: usize = 64;
 
@@ -18,13 +20,13 @@ pub const HISTORY: usize = 64;
 pub const RING: RingGeometry<SONARS> = RingGeometry::even();
 
 /// The filter.
-pub type Filter = RobustFilter<HYPOTHESES, VERTICES, HISTORY>;
+pub type Filter = OrderedFilter<HYPOTHESES, VERTICES, WAYS, HISTORY>;
 /// The settings of the filter.
-pub const FILTER: RobustConfig = RobustConfig { hypotheses: HYPOTHESES as u8, ..RobustConfig::DEFAULT };
+pub const FILTER: OrderedConfig = OrderedConfig::DEFAULT;
 
-/// The robot.
+/// The robot. Its buffer for snapshots may be empty.
 #[cfg(feature = "wire")]
 pub type SmallRobot<'buffer> = Robot<'buffer, SONARS, VERTICES, Filter>;
-/// The settings of the robot.
+/// The settings of the robot. Without a floating-point unit a place takes seconds.
 #[cfg(feature = "wire")]
-pub const ROBOT: RobotConfig<SONARS, RobustConfig> = RobotConfig::new(RING, FILTER);
+pub const ROBOT: RobotConfig<SONARS, OrderedConfig> = RobotConfig::new(RING, FILTER).with_turn_bound_ms(10_000);
