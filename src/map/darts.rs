@@ -358,8 +358,9 @@ impl<const V: usize, const D: usize> DartMap<V, D> {
         self.sort_ways(vertex);
     }
 
-    /// Counts a passage of the edge of a dart with a travel time.
-    pub(crate) fn time(&mut self, dart: u8, ln_travel: u16) {
+    /// Counts a passage of the edge of a dart with a travel time, as a natural logarithm of ring frames in
+    /// units of 2⁻¹².
+    pub fn time(&mut self, dart: u8, ln_travel: u16) {
         let holder = self.holder(dart);
         let Some(slot) = self.dart.get_mut(usize::from(holder)) else { return };
         slot.timed = slot.timed.saturating_add(1);
