@@ -2,7 +2,6 @@
 //!
 //! This module depends on the stages whose state it saves; no stage depends on this module.
 
-mod drive;
 mod mapper;
 mod robust_filter;
 pub mod snapshot;
@@ -53,8 +52,7 @@ use snapshot::{Reader, SnapshotError, Writer};
 /// # Ok::<(), SnapshotError>(())
 /// ```
 ///
-/// [`RobustFilter`](crate::RobustFilter) and [`Drive`](crate::drive::Drive) implement it, [`PaperFilter`](crate::PaperFilter)
-/// does not:
+/// [`RobustFilter`](crate::RobustFilter) implements it, [`PaperFilter`](crate::PaperFilter) does not:
 ///
 /// ```compile_fail,E0277
 /// use toposlam::persist::snapshot::Writer;

@@ -61,8 +61,7 @@ use crate::drive::{Drive, Goal, GoalStatus, VelocityCommand};
 use crate::fault::{FaultCounters, FaultKind};
 use crate::filter::{RobustFilter, Update};
 use crate::mapper::Mapper;
-use crate::persist::Persist;
-use crate::persist::snapshot::{Resume, Snapshot, SnapshotError, SnapshotPolicy, Writer};
+use crate::persist::snapshot::{Resume, SnapshotError, SnapshotPolicy, Writer};
 use crate::place::Place;
 use crate::ring::RingFrame;
 use crate::wire::{self, Echoes, Encoder, Health, Inbox, MAX_FRAME_BYTES, Message, QueueFull, Reporter, Staging};
@@ -88,7 +87,7 @@ pub struct Robot<'buffer, const SONARS: usize, const N: usize, const V: usize, c
     config: RobotConfig<SONARS>,
     mapper: Mapper<SONARS, V, RobustFilter<N, V, HISTORY>>,
     reporter: Reporter<V>,
-    drive: Drive<V, HISTORY>,
+    drive: Drive<V>,
     inbox: Inbox,
     staging: Staging<'buffer>,
     encoder: Encoder,
@@ -227,11 +226,11 @@ impl<'buffer, const SONARS: usize, const N: usize, const V: usize, const HISTORY
         (None, VelocityCommand::STOP)
     }
 
-    /// Writes a snapshot of drive and mapper to the board's store.
+    /// Writes a snapshot to the board's store.
     #[inline(never)]
     fn save_snapshot(&mut self, board: &mut impl Board) {
-        let Self { mapper, drive, staging, .. } = self;
-        let taken = staging.take(|buffer| snapshot(mapper, drive, buffer).ok());
+        let Self { mapper, staging, .. } = self;
+        let taken = staging.take(|buffer| snapshot(mapper, buffer).ok());
         match taken.map(|()| board.save(staging.taken())) {
             Ok(Ok(())) => {
                 self.stored_bytes = u16::try_from(self.staging.taken().len()).unwrap_or(u16::MAX);
@@ -320,7 +319,7 @@ impl<'buffer, const SONARS: usize, const N: usize, const V: usize, const HISTORY
     }
 
     /// The drive.
-    pub const fn drive(&self) -> &Drive<V, HISTORY> {
+    pub const fn drive(&self) -> &Drive<V> {
         &self.drive
     }
 }
@@ -353,34 +352,25 @@ impl<BOARD: Board> Line<'_, BOARD> {
     }
 }
 
-/// Writes a whole snapshot: the drive's section, then the mapper's in the remaining room.
+/// Writes a whole snapshot.
 fn snapshot<const SONARS: usize, const N: usize, const V: usize, const HISTORY: usize>(
     mapper: &mut Mapper<SONARS, V, RobustFilter<N, V, HISTORY>>,
-    drive: &mut Drive<V, HISTORY>,
     buffer: &mut [u8],
 ) -> Result<usize, SnapshotError> {
     let mut writer = Writer::new(buffer)?;
-    writer.stage(drive)?;
     mapper.save(&mut writer)?;
     writer.finish()
 }
 
-/// Restores a snapshot. A snapshot without the drive's section is from a robot driven by hand.
+/// Restores a snapshot; the drive explores from there.
 fn restore<const SONARS: usize, const N: usize, const V: usize, const HISTORY: usize>(
     mapper: &mut Mapper<SONARS, V, RobustFilter<N, V, HISTORY>>,
-    drive: &mut Drive<V, HISTORY>,
+    drive: &mut Drive<V>,
     bytes: &[u8],
     resume: Resume,
 ) -> Result<(), SnapshotError> {
-    let section = Snapshot::open(bytes)?.section(Drive::<V, HISTORY>::SECTION);
-    if let Some(section) = section {
-        drive.check(section)?;
-    }
     mapper.restore(bytes, resume)?;
-    match section {
-        Some(section) => drive.restore(section)?,
-        None => drive.resume(core::iter::empty()),
-    }
+    drive.resume();
     if resume == Resume::AtUnknownVertex {
         drive.kidnapped();
     }

@@ -23,11 +23,11 @@ use toposlam::reference::{ROBOT, ReferenceRobot, SONARS};
 use toposlam::ring::RingFrame;
 use toposlam::robot::{Board, SaveError, Seen};
 use toposlam::wire::{Encoder, MAX_FRAME_BYTES, QueueFull, Request};
-use toposlam::{FaultCounters, FaultKind};
+use toposlam::{FaultCounters, FaultKind, Filter};
 
 use crate::Step;
 use crate::injector::{FaultRates, LineInjector, RingInjector};
-use crate::world::{BodyModel, GroundTruth, Plan, RobotModel, Rover, VoronoiError};
+use crate::world::{BodyModel, GroundTruth, Plan, RobotModel, Rover, Told, VoronoiError};
 
 /// Duration of a ring frame on the simulated board, in milliseconds.
 const FRAME_MS: u32 = 100;
@@ -145,6 +145,7 @@ impl<'buffer> Exploration<'buffer> {
     pub fn map(&mut self, frame: &RingFrame<SONARS>) -> Seen {
         self.board.now_ms = self.board.now_ms.wrapping_add(FRAME_MS);
         self.frames += 1;
+        let passage = self.robot.drive().passage();
         let seen = self.robot.turn(frame, &self.ring_faults, &mut self.board);
         self.frames_not_taken += u32::from(self.robot.is_paused());
         if let Some((place, update)) = &seen {
@@ -152,7 +153,8 @@ impl<'buffer> Exploration<'buffer> {
             self.note(&Place { frame_index, ..*place });
             let map = self.robot.mapper().map();
             let (vertices, edges) = (map.vertices().len() as u8, map.edges().count());
-            self.steps.push(Step { place: *place, update: *update, vertices, edges });
+            let ways = passage.ways(&place.ways, self.robot.mapper().detector().rotation_mrad());
+            self.steps.push(Step { place: *place, told: Told { passage, ways }, update: *update, vertices, edges });
         }
         seen
     }
@@ -261,8 +263,7 @@ impl<'buffer> Exploration<'buffer> {
 
     /// The vertex of each place in the best map; `None` for a place that has left the history.
     pub fn path(&self) -> Vec<Option<usize>> {
-        let known: Vec<usize> = self.robot.mapper().filter().path().map(usize::from).collect();
-        let forgotten = self.nodes.len().saturating_sub(known.len());
-        std::iter::repeat_n(None, forgotten).chain(known.into_iter().map(Some)).collect()
+        let filter = self.robot.mapper().filter();
+        (0..self.nodes.len()).rev().map(|ago| filter.recent(ago).map(usize::from)).collect()
     }
 }
