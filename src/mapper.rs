@@ -57,12 +57,14 @@ impl<const SONARS: usize> MapperConfig<SONARS, RobustConfig> {
     pub const fn for_ring(geometry: RingGeometry<SONARS>) -> Self {
         Self::new(geometry, RobustConfig::DEFAULT)
     }
+}
 
-    #[cfg(feature = "wire")]
+#[cfg(feature = "wire")]
+impl<const SONARS: usize, C: crate::wire::FilterSettings> MapperConfig<SONARS, C> {
     pub(crate) const UNSET: Self = Self {
         geometry: RingGeometry { bearings_mrad: [0; SONARS] },
         place: PlaceConfig::UNSET,
-        filter: RobustConfig::UNSET,
+        filter: C::UNSET,
         seed: 0,
     };
 }

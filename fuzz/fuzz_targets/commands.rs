@@ -182,7 +182,7 @@ impl Client {
 struct Robot<'buffer> {
     inbox: Inbox,
     staging: Staging<'buffer>,
-    settings: Settings,
+    settings: Settings<RobustConfig>,
     filter: Box<Small>,
     turns: usize,
     goal: Option<u8>,

@@ -12,13 +12,14 @@
 use std::collections::VecDeque;
 use std::process::exit;
 
-use toposlam::reference::{self, PAPER_HISTORY_WORDS, PAPER_PARTICLES, PaperReference, VERTICES};
+use toposlam::reference;
+use toposlam::reference::paper::{self, PARTICLES, VERTICES};
 use toposlam::{Direction, Filter, Fingerprint, History, Map, Particle, VertexId};
 use toposlam_host_tests::graph::Graph;
 use toposlam_host_tests::ngram::{grams_of_graph, grams_of_history};
 
 const PLACES_MM: [u16; 400] = include!("../../src/bin/bench/places.rs");
-const N: usize = reference::PAPER_FILTER.ngram_length as usize;
+const N: usize = paper::FILTER.ngram_length as usize;
 const _: () = assert!(N <= 5, "n labels of 12 bits are packed into 64 bits");
 
 /// How many n-grams a labelled graph has, distinct up to reversal: the labels of all its walks of n vertices.
@@ -101,16 +102,14 @@ struct Place {
 
 fn count(direction: Direction) -> Vec<Place> {
     let halves = if direction == Direction::TwoSided { 2 } else { 1 };
-    let mut filter = Box::new(PaperReference::new());
-    filter
-        .start(reference::PAPER_FILTER.with_direction(direction), reference::SEED)
-        .expect("the reference settings are valid");
+    let mut filter = Box::new(paper::Filter::new());
+    filter.start(paper::FILTER.with_direction(direction), reference::SEED).expect("the reference settings are valid");
     let mut history = VecDeque::new();
     let mut places = Vec::new();
     for radius_mm in PLACES_MM {
         let observation = Fingerprint::from_radius_mm(radius_mm).expect("the input is in range");
         history.push_back(observation);
-        if history.len() > History::<PAPER_HISTORY_WORDS>::CAPACITY {
+        if history.len() > History::<{ paper::HISTORY_WORDS }>::CAPACITY {
             history.pop_front();
         }
         let ngrams_of_history = ngrams_of_history(&history);
@@ -177,7 +176,7 @@ fn main() {
     let places = count(direction);
     let of = |value: fn(&Place) -> u64| median_and_worst(places.iter().map(value));
     let comparisons = of(|place| place.comparisons);
-    println!("direction: {name}, N = {PAPER_PARTICLES}, n = {N}, V = {VERTICES}, {} places", places.len());
+    println!("direction: {name}, N = {PARTICLES}, n = {N}, V = {VERTICES}, {} places", places.len());
     println!("Per place, median and worst:");
     let print = |what: &str, [median, worst]: [u64; 2]| println!("  {what:<58} {median:>14} {worst:>14}");
     print("predictions, N x (K + 1)", of(|place| place.predictions));

@@ -3,7 +3,7 @@
 mod common;
 
 use common::notes::Notes;
-use toposlam::reference::{self, PaperReference, SONARS, VERTICES};
+use toposlam::reference::{self, SONARS, VERTICES, paper};
 use toposlam::wire::{
     Arrival, Belief, Capacities, Header, Hello, Location, MapReplica, Message, Reporter, ResetCause, Worst,
 };
@@ -86,5 +86,5 @@ fn a_listener_has_what_the_robust_filter_believes() {
 
 #[test]
 fn a_listener_has_what_the_paper_s_filter_believes() {
-    a_listener_has_what_the_filter_believes::<PaperReference>(reference::PAPER_FILTER);
+    a_listener_has_what_the_filter_believes::<paper::Filter>(paper::FILTER);
 }

@@ -87,6 +87,16 @@ pub trait Filter<const V: usize>: Sized {
     fn is_in_doubt(&self) -> bool {
         false
     }
+
+    /// Switches between mapping and localisation alone, in which the map does not change. A filter that always maps ignores it.
+    fn set_localise_only(&mut self, localise_only: bool) {
+        let _ = localise_only;
+    }
+
+    /// Whether the filter only localises.
+    fn is_localise_only(&self) -> bool {
+        false
+    }
 }
 
 #[cfg(test)]

@@ -152,6 +152,25 @@ impl<const V: usize> Map<V> {
         Ok(vertex)
     }
 
+    /// The sum of the fingerprints of a vertex in steps; with the visits it is the label without rounding.
+    #[cfg(feature = "snapshot")]
+    pub(crate) fn sum_steps(&self, vertex: VertexId) -> u32 {
+        if self.contains(vertex) { self.labels[vertex].sum_steps } else { 0 }
+    }
+
+    /// Adds a vertex by the sum of its fingerprints and their number; `None` when these are impossible or the map is full.
+    #[cfg(feature = "snapshot")]
+    pub(crate) fn add_counted_vertex(&mut self, sum_steps: u32, visits: u32) -> Option<VertexId> {
+        let label = Label { sum_steps, visits };
+        let is_possible =
+            (1..=Label::FULL).contains(&visits) && sum_steps <= visits * u32::from(Fingerprint::MAX.steps());
+        let vertex = self.next_vertex().filter(|_| is_possible)?;
+        self.labels[vertex] = label;
+        self.means[vertex] = label.mean();
+        self.vertices += 1;
+        Some(vertex)
+    }
+
     /// Takes one more fingerprint into the label of a vertex; nothing happens for a vertex the map does not have.
     pub fn observe(&mut self, vertex: VertexId, fingerprint: Fingerprint) {
         if self.contains(vertex) {

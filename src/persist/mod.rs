@@ -3,6 +3,7 @@
 //! This module depends on the stages whose state it saves; no stage depends on this module.
 
 mod mapper;
+mod paper_filter;
 mod robust_filter;
 pub mod snapshot;
 #[cfg(feature = "store")]
@@ -52,16 +53,7 @@ use snapshot::{Reader, SnapshotError, Writer};
 /// # Ok::<(), SnapshotError>(())
 /// ```
 ///
-/// [`RobustFilter`](crate::RobustFilter) implements it, [`PaperFilter`](crate::PaperFilter) does not:
-///
-/// ```compile_fail,E0277
-/// use toposlam::persist::snapshot::Writer;
-/// use toposlam::reference::PaperReference;
-///
-/// let mut buffer = [0; 64];
-/// let mut writer = Writer::new(&mut buffer).unwrap();
-/// writer.stage(&mut PaperReference::new());
-/// ```
+/// Every filter implements it.
 pub trait Persist {
     /// The tag of the section. The library uses tags below 128.
     const SECTION: u8;

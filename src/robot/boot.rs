@@ -4,11 +4,14 @@ use embedded_storage::nor_flash::NorFlash;
 
 use super::{Robot, RobotConfig};
 use crate::config_error::ConfigError;
+use crate::filter::Filter;
+use crate::persist::Persist;
 use crate::persist::store::{BootPolicy, BootReport, Store, resume};
-use crate::wire::Staging;
+use crate::wire::{FilterSettings, Staging};
 
-impl<'buffer, const SONARS: usize, const N: usize, const V: usize, const HISTORY: usize>
-    Robot<'buffer, SONARS, N, V, HISTORY>
+impl<'buffer, const SONARS: usize, const V: usize, F> Robot<'buffer, SONARS, V, F>
+where
+    F: Filter<V, Config: FilterSettings> + Persist,
 {
     /// Starts the robot and restores the newest snapshot of a store, if the policy allows it.
     ///
@@ -19,7 +22,7 @@ impl<'buffer, const SONARS: usize, const N: usize, const V: usize, const HISTORY
     /// As [`Robot::start`].
     pub fn boot<FLASH: NorFlash>(
         &mut self,
-        config: &RobotConfig<SONARS>,
+        config: &RobotConfig<SONARS, F::Config>,
         buffer: &'buffer mut [u8],
         store: &mut Store<FLASH>,
         policy: BootPolicy,

@@ -3,15 +3,21 @@
 use super::{Board, FRAMES_PER_HELLO, Line, RECEIVED_PER_TURN, Robot, restore, snapshot};
 use crate::drive::{self, Goal};
 use crate::fault::FaultKind;
-use crate::filter::RobustFilter;
+use crate::filter::Filter;
 use crate::map::VertexId;
+use crate::persist::Persist;
 use crate::persist::snapshot::Resume;
-use crate::wire::{Command, GoalState, GoalStatus, Info, Message, Outcome, Refusal, Setting, Settings, Version};
+use crate::wire::{
+    Command, FilterSettings, GoalState, GoalStatus, Info, Message, Outcome, Refusal, Setting, Settings, Version,
+};
 
 /// No goal status was sent.
 pub(super) const NO_GOAL: (Goal, drive::GoalStatus) = (Goal::Explore, drive::GoalStatus::Inactive);
 
-impl<const SONARS: usize, const N: usize, const V: usize, const HISTORY: usize> Robot<'_, SONARS, N, V, HISTORY> {
+impl<const SONARS: usize, const V: usize, F> Robot<'_, SONARS, V, F>
+where
+    F: Filter<V, Config: FilterSettings> + Persist,
+{
     /// Reads the received bytes and executes at most one command.
     #[inline(never)]
     pub(super) fn poll_commands(&mut self, board: &mut impl Board) {
@@ -46,8 +52,11 @@ impl<const SONARS: usize, const N: usize, const V: usize, const HISTORY: usize> 
             Command::Reset => self.reset(board)?,
             Command::SetConfig(setting) => self.set(setting)?,
             Command::LocaliseOnly { on } => {
-                self.localise_only = on;
                 self.mapper.filter_mut().set_localise_only(on);
+                self.localise_only = self.mapper.filter().is_localise_only();
+                if self.localise_only != on {
+                    return Err(Refusal::Unsupported);
+                }
             }
             Command::GoTo { vertex } => self.go_to(vertex, board)?,
             Command::Explore => self.set_goal(Goal::Explore, board),
@@ -93,7 +102,7 @@ impl<const SONARS: usize, const N: usize, const V: usize, const HISTORY: usize> 
         let mut line = Line { encoder, faults, board };
         reporter.forget(|message| line.send(message));
         mapper.start(&config.mapper).map_err(|_| Refusal::OutOfRange)?;
-        reporter.start(config.hello::<V, RobustFilter<N, V, HISTORY>>(), FRAMES_PER_HELLO);
+        reporter.start(config.hello::<V, F>(), FRAMES_PER_HELLO);
         drive.start(config.drive, config.mapper.seed).map_err(|_| Refusal::OutOfRange)?;
         self.localise_only = false;
         self.times_lost = 0;
@@ -108,7 +117,8 @@ impl<const SONARS: usize, const N: usize, const V: usize, const HISTORY: usize> 
             speed_permille: self.config.drive.speed_permille,
             snapshot_every_places: self.config.snapshot.every_places,
         };
-        let settings = settings.with(setting, N, SONARS)?;
+        // The filter itself refuses more hypotheses than it has room for.
+        let settings = settings.with(setting, usize::from(u8::MAX), SONARS)?;
         self.mapper.set_config(settings.place, settings.filter).map_err(|_| Refusal::OutOfRange)?;
         self.drive.set_speed(settings.speed_permille).map_err(|_| Refusal::OutOfRange)?;
         self.config.mapper.filter = settings.filter;

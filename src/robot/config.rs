@@ -6,14 +6,14 @@ use crate::mapper::MapperConfig;
 use crate::persist::snapshot::SnapshotPolicy;
 use crate::ring::RingGeometry;
 use crate::setters::setters;
-use crate::wire::{Capacities, Hello, ResetCause};
+use crate::wire::{Capacities, FilterSettings, Hello, ResetCause};
 
-/// The settings of a robot.
+/// The settings of a robot; `C` are those of its filter.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
-pub struct RobotConfig<const SONARS: usize> {
+pub struct RobotConfig<const SONARS: usize, C> {
     /// The stages from the ring frame to the map.
-    pub mapper: MapperConfig<SONARS, RobustConfig>,
+    pub mapper: MapperConfig<SONARS, C>,
     /// The drive.
     pub drive: DriveConfig,
     /// When snapshots are stored.
@@ -26,9 +26,9 @@ pub struct RobotConfig<const SONARS: usize> {
     pub reset_cause: ResetCause,
 }
 
-impl<const SONARS: usize> RobotConfig<SONARS> {
+impl<const SONARS: usize, C: Copy> RobotConfig<SONARS, C> {
     setters! {
-        with_mapper, mapper: MapperConfig<SONARS, RobustConfig>;
+        with_mapper, mapper: MapperConfig<SONARS, C>;
         with_drive, drive: DriveConfig;
         with_snapshot, snapshot: SnapshotPolicy;
         with_turn_bound_ms, turn_bound_ms: u16;
@@ -36,22 +36,13 @@ impl<const SONARS: usize> RobotConfig<SONARS> {
         with_reset_cause, reset_cause: ResetCause;
     }
 
-    /// The settings for a ring of 4 to 128 sensors.
+    /// The settings for a ring of 4 to 128 sensors and a filter.
     ///
     /// A robot that drives itself stands at a meet point until the place is reported. So `settle_frames` is 15, shorter than
     /// the default. All other settings follow from the ring, or are the defaults.
-    ///
-    /// ```
-    /// use toposlam::ring::RingGeometry;
-    /// use toposlam::robot::{Robot, RobotConfig};
-    ///
-    /// let mut robot = Box::new(Robot::<12, 10, 16, 400>::new());
-    /// robot.start(&RobotConfig::for_ring(RingGeometry::even()), &mut [])?;
-    /// # Ok::<(), toposlam::ConfigError>(())
-    /// ```
     #[must_use]
-    pub const fn for_ring(geometry: RingGeometry<SONARS>) -> Self {
-        let mut mapper = MapperConfig::for_ring(geometry);
+    pub const fn new(geometry: RingGeometry<SONARS>, filter: C) -> Self {
+        let mut mapper = MapperConfig::new(geometry, filter);
         mapper.place.settle_frames = 15;
         Self {
             mapper,
@@ -62,7 +53,27 @@ impl<const SONARS: usize> RobotConfig<SONARS> {
             reset_cause: ResetCause::Unknown,
         }
     }
+}
 
+impl<const SONARS: usize> RobotConfig<SONARS, RobustConfig> {
+    /// As [`RobotConfig::new`], for the robust filter with its defaults.
+    ///
+    /// ```
+    /// use toposlam::RobustFilter;
+    /// use toposlam::ring::RingGeometry;
+    /// use toposlam::robot::{Robot, RobotConfig};
+    ///
+    /// let mut robot = Box::new(Robot::<12, 16, RobustFilter<10, 16, 400>>::new());
+    /// robot.start(&RobotConfig::for_ring(RingGeometry::even()), &mut [])?;
+    /// # Ok::<(), toposlam::ConfigError>(())
+    /// ```
+    #[must_use]
+    pub const fn for_ring(geometry: RingGeometry<SONARS>) -> Self {
+        Self::new(geometry, RobustConfig::DEFAULT)
+    }
+}
+
+impl<const SONARS: usize, C: FilterSettings> RobotConfig<SONARS, C> {
     pub(super) const UNSET: Self = Self {
         mapper: MapperConfig::UNSET,
         drive: DriveConfig::UNSET,
@@ -73,7 +84,7 @@ impl<const SONARS: usize> RobotConfig<SONARS> {
     };
 
     /// The introduction of a robot with these settings and a filter `F`.
-    pub(super) fn hello<const V: usize, F: Filter<V, Config = RobustConfig>>(&self) -> Hello {
+    pub(super) fn hello<const V: usize, F: Filter<V, Config = C>>(&self) -> Hello {
         let capacities = Capacities::of_mapper::<SONARS, V, F>(&self.mapper);
         Hello::new(self.boot, self.reset_cause, self.mapper.seed, capacities)
     }

@@ -59,12 +59,15 @@ pub use config::RobotConfig;
 use crate::config_error::ConfigError;
 use crate::drive::{Drive, Goal, GoalStatus, VelocityCommand};
 use crate::fault::{FaultCounters, FaultKind};
-use crate::filter::{RobustFilter, Update};
+use crate::filter::{Filter, Update};
 use crate::mapper::Mapper;
+use crate::persist::Persist;
 use crate::persist::snapshot::{Resume, SnapshotError, SnapshotPolicy, Writer};
 use crate::place::Place;
 use crate::ring::RingFrame;
-use crate::wire::{self, Echoes, Encoder, Health, Inbox, MAX_FRAME_BYTES, Message, QueueFull, Reporter, Staging};
+use crate::wire::{
+    self, Echoes, Encoder, FilterSettings, Health, Inbox, MAX_FRAME_BYTES, Message, QueueFull, Reporter, Staging,
+};
 
 /// How often the robot sends a `Hello`, in ring frames.
 const FRAMES_PER_HELLO: u16 = 100;
@@ -76,16 +79,15 @@ const RECEIVED_PER_TURN: usize = 1024;
 /// The result of a turn: the place and the map update, if the frame completed a visit to a place.
 pub type Seen = Option<(Place, Update)>;
 
-/// A robot with a ring of `SONARS` sensors and a filter of `N` hypotheses, maps of `V` vertices and a history of
-/// `HISTORY` places.
+/// A robot with a ring of `SONARS` sensors and a filter with maps of at most `V` vertices.
 ///
 /// Const-constructed to zero, so that a `static` of it lies in `.bss`, and set up in place by [`Robot::start`]. Memory: the
 /// mapper's and the drive's, 700 bytes, and the caller's buffer for snapshots. Each turn costs at most what one place or one
 /// refinement step costs, and one command.
 #[derive(Debug)]
-pub struct Robot<'buffer, const SONARS: usize, const N: usize, const V: usize, const HISTORY: usize> {
-    config: RobotConfig<SONARS>,
-    mapper: Mapper<SONARS, V, RobustFilter<N, V, HISTORY>>,
+pub struct Robot<'buffer, const SONARS: usize, const V: usize, F: Filter<V>> {
+    config: RobotConfig<SONARS, F::Config>,
+    mapper: Mapper<SONARS, V, F>,
     reporter: Reporter<V>,
     drive: Drive<V>,
     inbox: Inbox,
@@ -106,8 +108,9 @@ pub struct Robot<'buffer, const SONARS: usize, const N: usize, const V: usize, c
     sent_goal: (Goal, GoalStatus),
 }
 
-impl<'buffer, const SONARS: usize, const N: usize, const V: usize, const HISTORY: usize>
-    Robot<'buffer, SONARS, N, V, HISTORY>
+impl<'buffer, const SONARS: usize, const V: usize, F> Robot<'buffer, SONARS, V, F>
+where
+    F: Filter<V, Config: FilterSettings> + Persist,
 {
     /// A robot that must be started with [`Robot::start`].
     pub const fn new() -> Self {
@@ -134,16 +137,20 @@ impl<'buffer, const SONARS: usize, const N: usize, const V: usize, const HISTORY
 
     /// Starts with an empty map, exploring.
     ///
-    /// `buffer` holds snapshots on their way to the flash or over the line. [`RobustFilter::SNAPSHOT_BYTES`] plus
-    /// `HISTORY + 16` bytes is room for every hypothesis. With an empty buffer the robot makes no snapshots.
+    /// `buffer` holds snapshots on their way to the flash or over the line. The `SNAPSHOT_BYTES` of the filter plus 420 bytes
+    /// is room for every hypothesis. With an empty buffer the robot makes no snapshots.
     ///
     /// # Errors
     /// [`ConfigError`] names the first setting that is out of its range; the robot must then be started again.
-    pub fn start(&mut self, config: &RobotConfig<SONARS>, buffer: &'buffer mut [u8]) -> Result<(), ConfigError> {
+    pub fn start(
+        &mut self,
+        config: &RobotConfig<SONARS, F::Config>,
+        buffer: &'buffer mut [u8],
+    ) -> Result<(), ConfigError> {
         self.mapper.start(&config.mapper)?;
         self.drive.start(config.drive, config.mapper.seed)?;
         self.config = *config;
-        self.reporter.start(config.hello::<V, RobustFilter<N, V, HISTORY>>(), FRAMES_PER_HELLO);
+        self.reporter.start(config.hello::<V, F>(), FRAMES_PER_HELLO);
         self.inbox = Inbox::new();
         self.staging = Staging::new(buffer);
         self.faults = FaultCounters::new();
@@ -314,7 +321,7 @@ impl<'buffer, const SONARS: usize, const N: usize, const V: usize, const HISTORY
     }
 
     /// The stages from the ring frame to the map.
-    pub const fn mapper(&self) -> &Mapper<SONARS, V, RobustFilter<N, V, HISTORY>> {
+    pub const fn mapper(&self) -> &Mapper<SONARS, V, F> {
         &self.mapper
     }
 
@@ -324,8 +331,9 @@ impl<'buffer, const SONARS: usize, const N: usize, const V: usize, const HISTORY
     }
 }
 
-impl<const SONARS: usize, const N: usize, const V: usize, const HISTORY: usize> Default
-    for Robot<'_, SONARS, N, V, HISTORY>
+impl<const SONARS: usize, const V: usize, F> Default for Robot<'_, SONARS, V, F>
+where
+    F: Filter<V, Config: FilterSettings> + Persist,
 {
     fn default() -> Self {
         Self::new()
@@ -353,8 +361,8 @@ impl<BOARD: Board> Line<'_, BOARD> {
 }
 
 /// Writes a whole snapshot.
-fn snapshot<const SONARS: usize, const N: usize, const V: usize, const HISTORY: usize>(
-    mapper: &mut Mapper<SONARS, V, RobustFilter<N, V, HISTORY>>,
+fn snapshot<const SONARS: usize, const V: usize, F: Filter<V> + Persist>(
+    mapper: &mut Mapper<SONARS, V, F>,
     buffer: &mut [u8],
 ) -> Result<usize, SnapshotError> {
     let mut writer = Writer::new(buffer)?;
@@ -363,8 +371,8 @@ fn snapshot<const SONARS: usize, const N: usize, const V: usize, const HISTORY: 
 }
 
 /// Restores a snapshot; the drive explores from there.
-fn restore<const SONARS: usize, const N: usize, const V: usize, const HISTORY: usize>(
-    mapper: &mut Mapper<SONARS, V, RobustFilter<N, V, HISTORY>>,
+fn restore<const SONARS: usize, const V: usize, F: Filter<V> + Persist>(
+    mapper: &mut Mapper<SONARS, V, F>,
     drive: &mut Drive<V>,
     bytes: &[u8],
     resume: Resume,

@@ -5,6 +5,7 @@ mod bad_bytes;
 mod common;
 mod exact;
 mod mapper;
+mod paper;
 mod specification;
 
 use common::environments::{easy, floor, six_rooms};

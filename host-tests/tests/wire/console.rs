@@ -22,7 +22,7 @@ pub(crate) struct FakeRobot {
     reporter: Reporter<VERTICES>,
     pub(crate) inbox: Inbox,
     staging: Staging<'static>,
-    pub(crate) settings: Settings,
+    pub(crate) settings: Settings<RobustConfig>,
     encoder: Encoder,
     paused: bool,
     localise_only: bool,

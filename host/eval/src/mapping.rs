@@ -21,7 +21,7 @@
 //! ```
 
 use toposlam::place::Place;
-use toposlam::reference::{self, PaperReference, VERTICES};
+use toposlam::reference::{self, VERTICES, paper};
 use toposlam::ring::{RingFrame, RingGeometry};
 use toposlam::{ConfigError, FaultCounters, Filter, Map, Mapper, MapperConfig, Passage, Update};
 
@@ -75,7 +75,7 @@ impl<const SONARS: usize> Stages<SONARS> for Robust<SONARS> {
 }
 
 /// The stages with the paper's filter, whose particles have paths only through a log.
-struct Paper<const SONARS: usize>(Box<Mapper<SONARS, VERTICES, PaperReference>>, Ancestry);
+struct Paper<const SONARS: usize>(Box<Mapper<SONARS, VERTICES, paper::Filter>>, Ancestry);
 
 impl<const SONARS: usize> Stages<SONARS> for Paper<SONARS> {
     fn observe(&mut self, frame: &RingFrame<SONARS>, passage: Passage) -> Option<(Place, Update)> {
@@ -131,7 +131,7 @@ impl<const SONARS: usize> Mapping<SONARS> {
     fn start(geometry: RingGeometry<SONARS>, filter: FilterChoice) -> Result<Self, ConfigError> {
         let stages: Box<dyn Stages<SONARS>> = match filter {
             FilterChoice::Robust => Box::new(Robust(started(geometry, reference::FILTER)?)),
-            FilterChoice::Paper => Box::new(Paper(started(geometry, reference::PAPER_FILTER)?, Ancestry::new())),
+            FilterChoice::Paper => Box::new(Paper(started(geometry, paper::FILTER)?, Ancestry::new())),
         };
         Ok(Self { stages, steps: Vec::new() })
     }

@@ -18,11 +18,12 @@
 use std::collections::VecDeque;
 
 use toposlam::drive::{Goal, VelocityCommand};
+use toposlam::persist::Persist;
 use toposlam::place::Place;
-use toposlam::reference::{ROBOT, ReferenceRobot, SONARS};
+use toposlam::reference::{self, ROBOT, SONARS, VERTICES};
 use toposlam::ring::RingFrame;
-use toposlam::robot::{Board, SaveError, Seen};
-use toposlam::wire::{Encoder, MAX_FRAME_BYTES, QueueFull, Request};
+use toposlam::robot::{Board, Robot, RobotConfig, SaveError, Seen};
+use toposlam::wire::{Encoder, FilterSettings, MAX_FRAME_BYTES, QueueFull, Request};
 use toposlam::{FaultCounters, FaultKind, Filter};
 
 use crate::Step;
@@ -82,10 +83,10 @@ impl Board for MemoryBoard {
     }
 }
 
-/// A robot, its world and the ground truth of its drive.
-pub struct Exploration<'buffer> {
+/// A robot with the ring of the reference robot and any filter, its world and the ground truth of its drive.
+pub struct Exploration<'buffer, const V: usize = VERTICES, F: Filter<V> = reference::Filter> {
     rover: Rover,
-    robot: Box<ReferenceRobot<'buffer>>,
+    robot: Box<Robot<'buffer, SONARS, V, F>>,
     board: MemoryBoard,
     encoder: Encoder,
     requests: u16,
@@ -109,9 +110,31 @@ impl<'buffer> Exploration<'buffer> {
     /// # Panics
     /// Never: the settings of the reference robot are valid.
     pub fn start(plan: &Plan, model: RobotModel, seed: u64, buffer: &'buffer mut [u8]) -> Result<Self, VoronoiError> {
+        Self::with_robot(plan, model, seed, &ROBOT, buffer)
+    }
+}
+
+impl<'buffer, const V: usize, F> Exploration<'buffer, V, F>
+where
+    F: Filter<V, Config: FilterSettings> + Persist,
+{
+    /// As [`Exploration::start`], with a robot of these settings and another filter.
+    ///
+    /// # Errors
+    /// As [`Exploration::start`].
+    ///
+    /// # Panics
+    /// If a setting of the robot is out of its range.
+    pub fn with_robot(
+        plan: &Plan,
+        model: RobotModel,
+        seed: u64,
+        config: &RobotConfig<SONARS, F::Config>,
+        buffer: &'buffer mut [u8],
+    ) -> Result<Self, VoronoiError> {
         let rover = Rover::new(plan, model, BodyModel::default(), seed)?;
-        let mut robot = Box::new(ReferenceRobot::new());
-        robot.start(&ROBOT, buffer).expect("the reference robot's settings are valid");
+        let mut robot = Box::new(Robot::new());
+        robot.start(config, buffer).expect("the settings of the robot are valid");
         let ground_truth = GroundTruth::new(rover.true_map());
         Ok(Self {
             rover,
@@ -202,12 +225,12 @@ impl<'buffer> Exploration<'buffer> {
     }
 
     /// The robot.
-    pub const fn robot(&self) -> &ReferenceRobot<'buffer> {
+    pub const fn robot(&self) -> &Robot<'buffer, SONARS, V, F> {
         &self.robot
     }
 
     /// The robot, for restoring or restarting it.
-    pub const fn robot_mut(&mut self) -> &mut ReferenceRobot<'buffer> {
+    pub const fn robot_mut(&mut self) -> &mut Robot<'buffer, SONARS, V, F> {
         &mut self.robot
     }
 

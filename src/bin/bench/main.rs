@@ -22,7 +22,7 @@ use toposlam::{
     persist::Persist,
     persist::snapshot::Writer,
     reference::{
-        self, Detector, Filter, HISTORY, PaperReference, ReferenceRobot, RobotMapper, SNAPSHOT_BYTES, SONARS, VERTICES,
+        self, Detector, Filter, HISTORY, ReferenceRobot, RobotMapper, SNAPSHOT_BYTES, SONARS, VERTICES, paper,
     },
     ring::{Echo, RingFrame},
     robot::{Board, SaveError},
@@ -49,7 +49,7 @@ enum Filters {
     /// The whole robot.
     Whole(ReferenceRobot<'static>),
     Robot(Filter),
-    Paper(PaperReference),
+    Paper(paper::Filter),
     Large(LargeFilter),
 }
 
@@ -256,9 +256,9 @@ fn main() -> ! {
         hprintln!("snapshot_instructions: {}", instructions);
         hprintln!("snapshot_bytes: {}", bytes);
     }
-    *filters = const { Filters::Paper(PaperReference::new()) };
+    *filters = const { Filters::Paper(paper::Filter::new()) };
     if let Filters::Paper(filter) = filters {
-        run(clock, filter, reference::PAPER_FILTER, Hints::Radius, (paper_costs, refinements), |_, _| {});
+        run(clock, filter, paper::FILTER, Hints::Radius, (paper_costs, refinements), |_, _| {});
     }
     // Measured here, before the larger filter, sorting and formatting use more stack than the robot does.
     let stack_bytes = shared::stack_high_water_bytes();
@@ -292,7 +292,7 @@ fn main() -> ! {
     hprintln!("ticks_per_million_instructions: {}", clock.ticks_per_million_instructions());
     hprintln!("filter_bytes: {}", size_of::<Filter>());
     hprintln!("large_filter_bytes: {}", size_of::<LargeFilter>());
-    hprintln!("paper_filter_bytes: {}", size_of::<PaperReference>());
+    hprintln!("paper_filter_bytes: {}", size_of::<paper::Filter>());
     hprintln!("mapper_bytes: {}", size_of::<RobotMapper>());
     hprintln!("stack_high_water_bytes: {}", stack_bytes);
     debug::exit(debug::EXIT_SUCCESS);

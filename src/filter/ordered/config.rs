@@ -42,6 +42,17 @@ impl OrderedConfig {
         travel_noise_permille: 100,
     };
 
+    /// What a robot holds before it is started: all zero.
+    #[cfg(feature = "wire")]
+    pub(crate) const UNSET: Self = Self {
+        noise_mm: 0,
+        wrong_exit_permille: 0,
+        missed_way_permille: 0,
+        false_way_permille: 0,
+        bearing_noise_mrad: 0,
+        travel_noise_permille: 0,
+    };
+
     /// Checks every field.
     ///
     /// # Errors

@@ -70,6 +70,18 @@ impl<const WORDS: usize> History<WORDS> {
         (0..self.len()).rev().filter_map(|age| self.newest(age))
     }
 
+    /// How many observations there were in total, congruent modulo the capacity.
+    #[cfg(feature = "snapshot")]
+    pub(crate) fn pushed(&self) -> u32 {
+        self.pushed
+    }
+
+    /// Goes back to where the observations that a history of this total holds, pushed again, give the same slots.
+    #[cfg(feature = "snapshot")]
+    pub(crate) fn resume(&mut self, pushed: u32) {
+        self.pushed = pushed - pushed.min(Self::CAPACITY as u32);
+    }
+
     /// Forgets everything.
     pub fn clear(&mut self) {
         self.pushed = 0;

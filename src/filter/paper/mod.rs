@@ -50,13 +50,13 @@ use rand_core::Rng;
 /// ```
 #[derive(Clone, Debug)]
 pub struct PaperFilter<const N: usize, const V: usize, const WORDS: usize> {
-    config: PaperConfig,
-    seed: u64,
-    observed: u32,
-    particles: Particles<N, V>,
-    history: History<WORDS>,
-    consistency: Consistency<V, WORDS, 1>,
-    faults: FaultCounters,
+    pub(crate) config: PaperConfig,
+    pub(crate) seed: u64,
+    pub(crate) observed: u32,
+    pub(crate) particles: Particles<N, V>,
+    pub(crate) history: History<WORDS>,
+    pub(crate) consistency: Consistency<V, WORDS, 1>,
+    pub(crate) faults: FaultCounters,
 }
 
 impl<const N: usize, const V: usize, const WORDS: usize> PaperFilter<N, V, WORDS> {

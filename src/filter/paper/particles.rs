@@ -20,7 +20,7 @@ pub(super) struct Step {
 
 /// The particles of two successive places, used in turn, and the pool they are drawn from.
 #[derive(Clone, Debug)]
-pub(super) struct Particles<const N: usize, const V: usize> {
+pub(crate) struct Particles<const N: usize, const V: usize> {
     generations: [[Particle<V>; N]; 2],
     current: bool,
     distinct: u8,
@@ -54,11 +54,32 @@ impl<const N: usize, const V: usize> Particles<N, V> {
         self.best = 0;
     }
 
-    pub(super) fn distinct(&self) -> u8 {
+    /// The number of the best particle.
+    #[cfg(feature = "snapshot")]
+    pub(crate) fn best_index(&self) -> u8 {
+        self.best
+    }
+
+    /// Starts with `distinct` particles, which [`Particles::put`] gives.
+    #[cfg(feature = "snapshot")]
+    pub(crate) fn resume(&mut self, config: &PaperConfig, distinct: u8, best: u8) {
+        self.start(config);
+        (self.distinct, self.best) = (distinct, best);
+    }
+
+    /// Replaces one particle.
+    #[cfg(feature = "snapshot")]
+    pub(crate) fn put(&mut self, index: usize, particle: &Particle<V>) {
+        if let Some(slot) = self.generations[usize::from(self.current)].get_mut(index) {
+            *slot = *particle;
+        }
+    }
+
+    pub(crate) fn distinct(&self) -> u8 {
         self.distinct
     }
 
-    pub(super) fn all(&self) -> &[Particle<V>] {
+    pub(crate) fn all(&self) -> &[Particle<V>] {
         self.generations[usize::from(self.current)].get(..usize::from(self.distinct)).unwrap_or(&[])
     }
 

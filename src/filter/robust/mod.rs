@@ -152,31 +152,6 @@ impl<const N: usize, const V: usize, const HISTORY: usize> RobustFilter<N, V, HI
         Ok(())
     }
 
-    /// Whether the filter only localises.
-    pub const fn is_localise_only(&self) -> bool {
-        self.localise_only
-    }
-
-    /// Switches between mapping and localisation alone.
-    ///
-    /// While the filter only localises, the map does not change and there are no proposals; the filter finds the vertex of the
-    /// robot, also after it was kidnapped. The places observed meanwhile count as evidence when mapping continues. Without a
-    /// vertex on the map they are lost.
-    pub fn set_localise_only(&mut self, localise_only: bool) {
-        if localise_only == self.localise_only {
-            return;
-        }
-        if localise_only && self.observed > 0 {
-            // The map that stays is the one that is published.
-            self.refresh();
-        }
-        self.localise_only = localise_only;
-        self.beam.keep_best();
-        if !localise_only && let Some(best) = self.beam.best_mut() {
-            best.recount(&self.model, &self.history);
-        }
-    }
-
     /// Publishes the best map without another place: the result of [`Filter::refine`] so far.
     pub fn refresh(&mut self) -> Update {
         self.update_bound();
@@ -303,6 +278,27 @@ impl<const N: usize, const V: usize, const HISTORY: usize> Filter<V> for RobustF
 
     fn is_in_doubt(&self) -> bool {
         self.has_unexplained_ngram()
+    }
+
+    /// The filter then finds the vertex of the robot alone, also after it was kidnapped, and there are no proposals. The places
+    /// observed meanwhile count as evidence when mapping continues. Without a vertex on the map they are lost.
+    fn set_localise_only(&mut self, localise_only: bool) {
+        if localise_only == self.localise_only {
+            return;
+        }
+        if localise_only && self.observed > 0 {
+            // The map that stays is the one that is published.
+            self.refresh();
+        }
+        self.localise_only = localise_only;
+        self.beam.keep_best();
+        if !localise_only && let Some(best) = self.beam.best_mut() {
+            best.recount(&self.model, &self.history);
+        }
+    }
+
+    fn is_localise_only(&self) -> bool {
+        self.localise_only
     }
 }
 

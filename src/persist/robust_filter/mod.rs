@@ -10,11 +10,8 @@ use crate::fault::FaultCounters;
 use crate::filter::robust::worst_ngram;
 use crate::filter::{RobustConfig, RobustFilter};
 use crate::persist::Persist;
-use crate::persist::snapshot::{FILTER_SECTION, FRAME_BYTES, Reader, SnapshotError, Writer};
+use crate::persist::snapshot::{FILTER_SECTION, FRAME_BYTES, ROBUST, Reader, SnapshotError, Writer};
 use parts::{STATISTICS_BYTES, path_bytes, row_bytes};
-
-/// The first byte of the filter's section: the kind of filter.
-const ROBUST: u8 = 1;
 
 /// Bounds of the noise scale 2 σ², in steps².
 const SCALES: core::ops::RangeInclusive<f32> = 0.1..=1e6;

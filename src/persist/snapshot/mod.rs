@@ -35,12 +35,15 @@ use crate::checksum::CRC;
 use core::fmt;
 
 /// The version of the layout. A snapshot of another version is refused.
-pub const SNAPSHOT_VERSION: u16 = 1;
+pub const SNAPSHOT_VERSION: u16 = 2;
 
 /// The tag of the filter's section.
 pub const FILTER_SECTION: u8 = 1;
-/// The tag of the drive's section.
-pub const DRIVE_SECTION: u8 = 2;
+
+/// The first byte of the filter's section: the kind of filter.
+pub(crate) const ROBUST: u8 = 1;
+/// As [`ROBUST`], of the paper's filter.
+pub(crate) const PAPER: u8 = 2;
 
 /// The first bytes of every snapshot.
 const MAGIC: [u8; 4] = *b"TSLM";
@@ -202,10 +205,10 @@ mod tests {
     fn another_version_is_refused() {
         let mut buffer = [0; 100];
         let length = two_sections(&mut buffer).unwrap();
-        buffer[4] = 2;
+        buffer[4] = 1;
         let crc = CRC.checksum(&buffer[..length - CRC_BYTES]);
         buffer[length - CRC_BYTES..length].copy_from_slice(&crc.to_le_bytes());
-        assert_eq!(Snapshot::open(&buffer[..length]).err(), Some(SnapshotError::Version { found: 2 }));
+        assert_eq!(Snapshot::open(&buffer[..length]).err(), Some(SnapshotError::Version { found: 1 }));
     }
 
     #[test]

@@ -23,4 +23,4 @@ pub use message::{
 pub use navigation::{GoalState, GoalStatus, Velocity};
 pub use payload::Payload;
 pub use reply::{Info, Outcome, Refusal, Reply, Version};
-pub use setting::{Setting, Settings};
+pub use setting::{FilterSettings, Setting, Settings};

@@ -3,16 +3,16 @@
 use serde::{Deserialize, Serialize};
 
 use super::Refusal;
-use crate::filter::RobustConfig;
+use crate::filter::{OrderedConfig, PaperConfig, RobustConfig};
 use crate::place::PlaceConfig;
 
 /// One setting and its value. Append-only; every value is a `u16`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[non_exhaustive]
 pub enum Setting {
-    /// [`RobustConfig::noise_mm`].
+    /// [`RobustConfig::noise_mm`], [`OrderedConfig::noise_mm`] or [`PaperConfig::sigma_label_mm`].
     NoiseMm(u16),
-    /// [`RobustConfig::hypotheses`].
+    /// [`RobustConfig::hypotheses`] or [`PaperConfig::particles`].
     Hypotheses(u16),
     /// [`RobustConfig::moves`].
     Moves(u16),
@@ -30,11 +30,84 @@ pub enum Setting {
     SnapshotEveryPlaces(u16),
 }
 
-/// The values of all settings that can be changed while the robot runs.
+/// The settings of a filter, as the robot and its line see them.
+pub trait FilterSettings: Copy {
+    /// Zero in every field: the settings of a robot that was not started.
+    const UNSET: Self;
+
+    /// Changes one setting of the filter; the ranges are not checked.
+    ///
+    /// # Errors
+    /// [`Refusal::Unsupported`] for a setting that the filter does not have, [`Refusal::OutOfRange`] for a value that its field
+    /// cannot hold.
+    fn change(&mut self, setting: Setting) -> Result<(), Refusal>;
+
+    /// Whether every field is in its range, for a filter with room for this many hypotheses.
+    fn is_valid(&self, hypotheses: usize) -> bool;
+}
+
+fn byte(value: u16) -> Result<u8, Refusal> {
+    u8::try_from(value).map_err(|_| Refusal::OutOfRange)
+}
+
+impl FilterSettings for RobustConfig {
+    const UNSET: Self = Self::UNSET;
+
+    fn change(&mut self, setting: Setting) -> Result<(), Refusal> {
+        match setting {
+            Setting::NoiseMm(value) => self.noise_mm = value,
+            Setting::Hypotheses(value) => self.hypotheses = byte(value)?,
+            Setting::Moves(value) => self.moves = byte(value)?,
+            Setting::WrongTurnPermille(value) => self.wrong_turn_permille = value,
+            Setting::WrongDegreePermille(value) => self.wrong_degree_permille = value,
+            _ => return Err(Refusal::Unsupported),
+        }
+        Ok(())
+    }
+
+    fn is_valid(&self, hypotheses: usize) -> bool {
+        self.check(hypotheses).is_ok()
+    }
+}
+
+impl FilterSettings for OrderedConfig {
+    const UNSET: Self = Self::UNSET;
+
+    fn change(&mut self, setting: Setting) -> Result<(), Refusal> {
+        match setting {
+            Setting::NoiseMm(value) => self.noise_mm = value,
+            _ => return Err(Refusal::Unsupported),
+        }
+        Ok(())
+    }
+
+    fn is_valid(&self, _: usize) -> bool {
+        self.check().is_ok()
+    }
+}
+
+impl FilterSettings for PaperConfig {
+    const UNSET: Self = Self::UNSET;
+
+    fn change(&mut self, setting: Setting) -> Result<(), Refusal> {
+        match setting {
+            Setting::NoiseMm(value) => self.sigma_label_mm = value,
+            Setting::Hypotheses(value) => self.particles = byte(value)?,
+            _ => return Err(Refusal::Unsupported),
+        }
+        Ok(())
+    }
+
+    fn is_valid(&self, hypotheses: usize) -> bool {
+        self.check(hypotheses).is_ok()
+    }
+}
+
+/// The values of all settings that can be changed while the robot runs; `C` are those of its filter.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Settings {
+pub struct Settings<C> {
     /// The filter's settings.
-    pub filter: RobustConfig,
+    pub filter: C,
     /// The place detector's settings.
     pub place: PlaceConfig,
     /// The speed in thousandths of the drive's full speed, 1 to 1000.
@@ -43,25 +116,20 @@ pub struct Settings {
     pub snapshot_every_places: u16,
 }
 
-impl Settings {
+impl<C: FilterSettings> Settings<C> {
     /// The settings with one of them changed, for a robot of these capacities.
     ///
     /// # Errors
-    /// [`Refusal::OutOfRange`] if the value is out of its range.
+    /// [`Refusal::OutOfRange`] if the value is out of its range, [`Refusal::Unsupported`] if the filter has no such setting.
     pub fn with(mut self, setting: Setting, hypotheses: usize, sonars: usize) -> Result<Self, Refusal> {
-        let byte = |value: u16| u8::try_from(value).map_err(|_| Refusal::OutOfRange);
         match setting {
-            Setting::NoiseMm(value) => self.filter.noise_mm = value,
-            Setting::Hypotheses(value) => self.filter.hypotheses = byte(value)?,
-            Setting::Moves(value) => self.filter.moves = byte(value)?,
-            Setting::WrongTurnPermille(value) => self.filter.wrong_turn_permille = value,
-            Setting::WrongDegreePermille(value) => self.filter.wrong_degree_permille = value,
             Setting::EquidistanceMm(value) => self.place.equidistance_mm = value,
             Setting::LeaveMm(value) => self.place.leave_mm = value,
             Setting::SpeedPermille(value) => self.speed_permille = value,
             Setting::SnapshotEveryPlaces(value) => self.snapshot_every_places = value,
+            _ => self.filter.change(setting)?,
         }
-        let is_sound = self.filter.check(hypotheses).is_ok()
+        let is_sound = self.filter.is_valid(hypotheses)
             && self.place.check(sonars).is_ok()
             && (1..=1000).contains(&self.speed_permille);
         if is_sound { Ok(self) } else { Err(Refusal::OutOfRange) }
@@ -72,7 +140,7 @@ impl Settings {
 mod tests {
     use super::*;
 
-    const SETTINGS: Settings = Settings {
+    const SETTINGS: Settings<RobustConfig> = Settings {
         filter: RobustConfig::DEFAULT,
         place: PlaceConfig::DEFAULT,
         speed_permille: 1000,
@@ -82,7 +150,7 @@ mod tests {
     #[test]
     fn every_setting_accepts_its_range_only() {
         type Make = fn(u16) -> Setting;
-        type Of = fn(&Settings) -> u16;
+        type Of = fn(&Settings<RobustConfig>) -> u16;
         let settings: [(Make, Of, u16, u16); 9] = [
             (Setting::NoiseMm, |s| s.filter.noise_mm, 1, 1000),
             (Setting::Hypotheses, |s| s.filter.hypotheses.into(), 1, 7),
@@ -107,5 +175,17 @@ mod tests {
                 assert_eq!(seven.with(setting(value), 7, 16), Err(Refusal::OutOfRange), "{:?}", setting(value));
             }
         }
+    }
+
+    #[test]
+    fn a_setting_that_the_filter_does_not_have_is_refused() {
+        let Settings { place, speed_permille, snapshot_every_places, .. } = SETTINGS;
+        let paper = Settings { filter: PaperConfig::DEFAULT, place, speed_permille, snapshot_every_places };
+        assert_eq!(paper.with(Setting::Moves(1), 10, 16), Err(Refusal::Unsupported));
+        assert_eq!(paper.with(Setting::NoiseMm(70), 10, 16).unwrap().filter.sigma_label_mm, 70);
+        assert_eq!(paper.with(Setting::Hypotheses(11), 10, 16), Err(Refusal::OutOfRange));
+        let ordered = Settings { filter: OrderedConfig::DEFAULT, place, speed_permille, snapshot_every_places };
+        assert_eq!(ordered.with(Setting::WrongTurnPermille(1), 10, 16), Err(Refusal::Unsupported));
+        assert_eq!(ordered.with(Setting::NoiseMm(70), 10, 16).unwrap().filter.noise_mm, 70);
     }
 }
