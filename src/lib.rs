@@ -123,7 +123,7 @@
 //! | Eq. 6, the weight | `filter/paper/particle.rs` |
 //! | Eq. 7 to 9, its factors | `filter/paper/likelihood.rs` |
 //! | Section III.B, localisation | `filter/mod.rs` ([`Update::vertex`]) |
-//! | Eq. 2, the half from history to map, with its n-gram | `filter/robust/worst_ngram.rs` |
+//! | Eq. 2, the half from history to map, with its n-gram | `filter/worst_ngram.rs` |
 //! | Section IV.A, meet points | `place/` |
 #![cfg_attr(not(test), no_std)]
 #![forbid(unsafe_code)]
@@ -156,9 +156,9 @@ pub use config_error::ConfigError;
 pub use fault::{FaultCounters, FaultKind};
 pub use filter::{
     Consistency, Direction, Evidence, Exit, Filter, FilterCapacities, History, Ngram, NgramError, NgramLength,
-    NgramTable, NgramsFull, Observation, OrderedConfig, OrderedFactors, OrderedFilter, OrderedObservation, PaperConfig,
+    NgramTable, NgramsFull, Observation, OrderedConfig, OrderedFactors, OrderedFilter, PaperConfig,
     PaperFactors, PaperFilter, Particle, Passage, Prior, RobustConfig, RobustFactors, RobustFilter, Update, WAYS_MAX,
-    Ways, WaysError, WaysSeen, WeightFactors, WorstNgram,
+    Ways, WaysError, WeightFactors, WorstNgram,
 };
 pub use map::darts::{Bearing, DartMap, WAYS};
 pub use map::{DartId, Darts, Map, PerVertex, VertexId, VertexSet, VerticesFull};

@@ -2,7 +2,7 @@
 
 use crate::config_error::ConfigError;
 use crate::fault::FaultCounters;
-use crate::filter::{Filter, Observation, Passage, RobustConfig, Update};
+use crate::filter::{Filter, Observation, OrderedConfig, Passage, RobustConfig, Update};
 use crate::map::Map;
 use crate::place::{Place, PlaceConfig, PlaceDetector};
 use crate::ring::{RingFrame, RingGeometry};
@@ -67,6 +67,14 @@ impl<const SONARS: usize, C: crate::wire::FilterSettings> MapperConfig<SONARS, C
         filter: C::UNSET,
         seed: 0,
     };
+}
+
+impl<const SONARS: usize> MapperConfig<SONARS, OrderedConfig> {
+    /// The settings for a ring of 4 to 128 sensors and the ordered filter with its defaults.
+    #[must_use]
+    pub const fn ordered(geometry: RingGeometry<SONARS>) -> Self {
+        Self::new(geometry, OrderedConfig::DEFAULT)
+    }
 }
 
 /// The mapping pipeline: a place detector for a ring of `SONARS` sensors and a filter with maps of at most `V` vertices.

@@ -5,11 +5,13 @@ mod observation;
 mod ordered;
 mod paper;
 pub(crate) mod robust;
+mod vertex_ids;
 mod ways;
+mod worst_ngram;
 
 pub use interface::{Filter, FilterCapacities};
 pub use observation::{Observation, Passage};
-pub use ordered::{OrderedConfig, OrderedFilter, OrderedObservation, WaysSeen};
+pub use ordered::{OrderedConfig, OrderedFilter};
 pub use paper::{
     Consistency, Direction, Evidence, History, Ngram, NgramError, NgramLength, NgramTable, NgramsFull, PaperConfig,
     PaperFilter, Particle, Prior,

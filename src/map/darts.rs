@@ -32,6 +32,9 @@ pub(super) struct Dart {
 }
 
 impl Dart {
+    /// What a slot holds that was never used: all zero, so that an empty map needs no initial values.
+    const ZERO: Self = Self { vertex: 0, partner: 0, bearing: 0, seen: 0, timed: 0, ln_travel: 0 };
+
     const NONE: Self = Self { vertex: NONE, partner: NONE, bearing: 0, seen: 0, timed: 0, ln_travel: 0 };
 }
 
@@ -43,7 +46,7 @@ pub(super) struct VertexWays {
 }
 
 impl VertexWays {
-    const NONE: Self = Self { count: 0, darts: [NONE; WAYS] };
+    const NONE: Self = Self { count: 0, darts: [0; WAYS] };
 
     pub(super) fn as_slice(&self) -> &[u8] {
         self.darts.get(..usize::from(self.count)).unwrap_or(&[])
@@ -67,7 +70,7 @@ impl<const V: usize, const D: usize> DartMap<V, D> {
     pub const EMPTY: Self = {
         assert!(V >= 1 && V <= 64, "a map holds 1 to 64 vertices");
         assert!(D >= 2 && D <= 254, "a map holds 2 to 254 darts");
-        Self { vertices: 0, darts: 0, ways: [VertexWays::NONE; V], dart: [Dart::NONE; D] }
+        Self { vertices: 0, darts: 0, ways: [VertexWays::NONE; V], dart: [Dart::ZERO; D] }
     };
 
     /// Removes all vertices and darts. Cost: O(V).
@@ -75,6 +78,17 @@ impl<const V: usize, const D: usize> DartMap<V, D> {
         self.vertices = 0;
         self.darts = 0;
         self.ways.fill(VertexWays::NONE);
+    }
+
+    /// Takes over a map with other vertex numbers: `number` gives the new number of each vertex. Darts keep their numbers.
+    pub(crate) fn renumber_from(&mut self, other: &Self, number: impl Fn(u8) -> u8) {
+        self.clone_from(other);
+        for (vertex, ways) in (0..other.vertices).zip(&other.ways) {
+            if let Some(slot) = self.ways.get_mut(usize::from(number(vertex))) {
+                *slot = *ways;
+            }
+        }
+        self.dart.iter_mut().take(self.darts.into()).for_each(|dart| dart.vertex = number(dart.vertex));
     }
 
     /// Read access with typed numbers.

@@ -4,7 +4,7 @@
 
 use rand::seq::SliceRandom;
 use std::path::Path;
-use toposlam::{OrderedConfig, OrderedFilter};
+use toposlam::{Filter as _, OrderedConfig, OrderedFilter};
 use toposlam_eval::{
     environment::Environment,
     ordered::{Bearings, Building, WalkKind, WayHints, is_exact},
@@ -71,9 +71,10 @@ fn main() -> anyhow::Result<()> {
                 if step > 0 {
                     (0..REFINEMENTS).for_each(|_| filter.refine());
                 }
-                filter.observe(report);
+                filter.observe(*report);
                 if LENGTHS.contains(&(step + 1)) {
-                    exact.push(is_exact(building, &walk[..=step], filter.map(), filter.path()));
+                    let (map, path) = (filter.darts().expect("the filter has ways"), filter.path().collect::<Vec<_>>());
+                    exact.push(is_exact(building, &walk[..=step], map, &path));
                 }
             }
             Ok::<_, String>(exact)

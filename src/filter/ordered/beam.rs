@@ -39,7 +39,7 @@ pub(super) struct Beam<const N: usize, const V: usize, const D: usize, const T: 
 
 impl<const N: usize, const V: usize, const D: usize, const T: usize> Beam<N, V, D, T> {
     pub(super) const fn new() -> Self {
-        Self { slots: [Hypothesis::NONE; N], order: [0; N], len: 0 }
+        Self { slots: [Hypothesis::ZERO; N], order: [0; N], len: 0 }
     }
 
     /// Starts with the hypothesis that knows nothing.
@@ -59,6 +59,11 @@ impl<const N: usize, const V: usize, const D: usize, const T: usize> Beam<N, V, 
         if let Some(first) = self.slots.first_mut() {
             first.clone_from(hypothesis);
         }
+    }
+
+    /// Whether the filter was not started.
+    pub(super) fn is_empty(&self) -> bool {
+        self.len == 0
     }
 
     pub(super) fn len(&self) -> usize {

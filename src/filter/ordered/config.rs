@@ -42,8 +42,7 @@ impl OrderedConfig {
         travel_noise_permille: 100,
     };
 
-    /// What a robot holds before it is started: all zero.
-    #[cfg(feature = "wire")]
+    /// What a filter holds before it is started: all zero.
     pub(crate) const UNSET: Self = Self {
         noise_mm: 0,
         wrong_exit_permille: 0,

@@ -220,7 +220,7 @@ mod tests {
     /// `copies` of the building, an edge of copy `i` leading to copy `i + shift(dart)`: a covering map, which folds onto the
     /// building.
     fn cover(copies: usize, shift: impl Fn(usize) -> usize) -> Small {
-        let mut hypothesis = Small::NONE;
+        let mut hypothesis = Small::ZERO;
         let mut partner = Vec::new();
         for _ in 0..copies {
             for (place, ways) in BUILDING.iter().enumerate() {

@@ -2,7 +2,9 @@
 
 use super::model::{LN_WAYS, Model, SAME_WAY};
 use super::record::{Entry, Record};
+use crate::filter::Exit;
 use crate::map::darts::{Bearing, DartMap, NONE, WAYS};
+use crate::place::Fingerprint;
 
 /// Labels that are this many standard deviations off are not looked at.
 const FAR: f32 = 5.0;
@@ -50,6 +52,11 @@ impl Label {
         }
     }
 
+    /// The rounded mean.
+    pub(super) fn fingerprint(&self) -> Fingerprint {
+        Fingerprint::from_steps((self.mean + 0.5) as u16).unwrap_or(Fingerprint::MAX)
+    }
+
     pub(super) fn evidence(&self, model: &Model) -> f32 {
         model.labels.evidence_of_labels(self.visits, self.scatter)
     }
@@ -72,6 +79,30 @@ pub(super) enum Target {
 pub(super) struct Choice {
     pub(super) exit: u8,
     pub(super) target: Target,
+}
+
+/// What the robot reported of the exit by which it left a place.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum ReportedExit {
+    Unknown,
+    /// This way.
+    Way(u8),
+    /// Any but this one, by which it came.
+    NotBack(u8),
+}
+
+impl ReportedExit {
+    /// ln P of leaving by one of `ways` ways, and of the report: each way is as likely as another.
+    pub(super) fn ln(self, model: &Model, exit: u8, ways: usize) -> f32 {
+        let report = match self {
+            Self::Unknown => 0.0,
+            Self::Way(way) if way == exit => model.right_exit,
+            Self::Way(_) => model.ln_wrong_exit(ways.saturating_sub(1)),
+            Self::NotBack(came_by) if came_by != exit => model.right_exit,
+            Self::NotBack(_) => model.ln_wrong_exit(1),
+        };
+        report - model.ln_of(ways)
+    }
 }
 
 /// What a choice gains: the logarithms of the labels' evidence and of all else.
@@ -103,14 +134,15 @@ pub(super) struct Hypothesis<const V: usize, const D: usize, const T: usize> {
 }
 
 impl<const V: usize, const D: usize, const T: usize> Hypothesis<V, D, T> {
-    pub(super) const NONE: Self = Self {
+    /// All zero. It has to be cleared before its first use.
+    pub(super) const ZERO: Self = Self {
         map: DartMap::EMPTY,
         labels: [Label::NONE; V],
-        at: NONE,
+        at: 0,
         label_evidence: 0.0,
         rest: 0.0,
         map_key: 0,
-        path: [NONE; T],
+        path: [0; T],
     };
 
     pub(super) fn clear(&mut self) {
@@ -153,7 +185,7 @@ impl<const V: usize, const D: usize, const T: usize> Hypothesis<V, D, T> {
         let mut found = [(NONE, 0); WAYS - 1];
         for _ in ways {
             let mut best = (NONE, 0, 0, SAME_WAY + 1);
-            for (slot, bearing) in entry.ways.others().enumerate() {
+            for (slot, bearing) in entry.others().enumerate() {
                 if found.get(slot).is_none_or(|&(way, _)| way != NONE) {
                     continue;
                 }
@@ -189,11 +221,11 @@ impl<const V: usize, const D: usize, const T: usize> Hypothesis<V, D, T> {
 
     /// ln P of the ways seen at a vertex that the robot came to by `reference`.
     fn ways_evidence(&self, model: &Model, entry: &Entry, vertex: u8, reference: u8) -> f32 {
-        if entry.ways.count() == 0 {
+        if entry.count() == 0 {
             return 0.0;
         }
         let looks = self.label(vertex).looks;
-        let others = usize::from(entry.ways.count()) - 1;
+        let others = usize::from(entry.count()) - 1;
         let found = self.identify(entry, vertex, reference);
         let (reference_off, weight) = self.reference_off(&found, reference);
         let mut evidence = model.reference(reference_off, self.map.seen(reference), looks, weight);
@@ -224,8 +256,8 @@ impl<const V: usize, const D: usize, const T: usize> Hypothesis<V, D, T> {
 
     /// What it gains to be at a new vertex.
     pub(super) fn new_arrival(&self, model: &Model, entry: &Entry) -> Gain {
-        let others = f32::from(entry.ways.count().saturating_sub(1));
-        let number = if entry.ways.count() == 0 { 0.0 } else { -LN_WAYS };
+        let others = f32::from(entry.count().saturating_sub(1));
+        let number = if entry.count() == 0 { 0.0 } else { -LN_WAYS };
         Gain {
             labels: Label::NONE.including(entry.steps).evidence(model),
             rest: others * model.way_new(0) + number + model.vertex(self.map.vertices()),
@@ -246,17 +278,19 @@ impl<const V: usize, const D: usize, const T: usize> Hypothesis<V, D, T> {
         off * off > FAR * FAR * 2.0 * variance
     }
 
-    /// The way that was told for the exit that led to observation `index`, when the robot came to the place before by `from`.
-    pub(super) fn told_way(&self, record: &Record<T>, index: usize, from: u8) -> Option<u8> {
-        let bearing = record.exit_bearing(index)?;
-        if bearing == 0 {
-            return Some(from);
-        }
+    /// What observation `index` says of the exit that led to it, when the robot came to the place before by `from`.
+    pub(super) fn reported_exit(&self, record: &Record<T>, index: usize, from: u8) -> ReportedExit {
+        let bearing = match record.get(index).exit() {
+            None => return ReportedExit::Unknown,
+            Some(Exit::On) => return ReportedExit::NotBack(from),
+            Some(Exit::Back) => return ReportedExit::Way(from),
+            Some(Exit::Bearing(bearing)) => u16::from(bearing) << 8,
+        };
         let target = self.map.bearing(from).wrapping_add(bearing);
-        self.map
-            .nearest_way(self.map.vertex(from), target)
-            .filter(|(_, off)| off.unsigned_abs() <= SAME_WAY)
-            .map(|(way, _)| way)
+        match self.map.nearest_way(self.map.vertex(from), target) {
+            Some((way, off)) if off.unsigned_abs() <= SAME_WAY => ReportedExit::Way(way),
+            _ => ReportedExit::Unknown,
+        }
     }
 
     /// Proposes every way to explain observation `index`, with what it gains, but for those whose exit costs more than `worst`.
@@ -272,22 +306,22 @@ impl<const V: usize, const D: usize, const T: usize> Hypothesis<V, D, T> {
         if self.at == NONE || entry.starts() {
             let mut propose = |target| {
                 let choice = Choice { exit: NONE, target };
-                proposed(choice, self.gain(model, &entry, None, choice));
+                proposed(choice, self.gain(model, &entry, ReportedExit::Unknown, choice));
             };
             propose(Target::New);
             let near = |&dart: &u8| !self.is_far(model, entry.steps, self.map.vertex(dart));
             (0..self.map.darts()).filter(near).for_each(|dart| propose(Target::At(dart)));
             return;
         }
-        let told = self.told_way(record, index, self.at);
+        let reported = self.reported_exit(record, index, self.at);
         let ways = self.map.ways(self.map.vertex(self.at));
         for &exit in ways {
-            if model.exit(told.map(|told| told == exit), ways.len()) < worst {
+            if reported.ln(model, exit, ways.len()) < worst {
                 continue;
             }
             let mut propose = |target| {
                 let choice = Choice { exit, target };
-                proposed(choice, self.gain(model, &entry, told, choice));
+                proposed(choice, self.gain(model, &entry, reported, choice));
             };
             if self.map.partner(exit).is_some() {
                 propose(Target::Known);
@@ -302,8 +336,8 @@ impl<const V: usize, const D: usize, const T: usize> Hypothesis<V, D, T> {
         }
     }
 
-    /// What a choice gains, the way `told` being the one by which the robot says that it left.
-    pub(super) fn gain(&self, model: &Model, entry: &Entry, told: Option<u8>, choice: Choice) -> Gain {
+    /// What a choice gains, given what the robot reported of its exit.
+    pub(super) fn gain(&self, model: &Model, entry: &Entry, reported: ReportedExit, choice: Choice) -> Gain {
         let Choice { exit, target } = choice;
         let mut gain = match target {
             Target::New => self.new_arrival(model, entry),
@@ -315,7 +349,7 @@ impl<const V: usize, const D: usize, const T: usize> Hypothesis<V, D, T> {
             return gain;
         }
         let ways = self.map.ways(self.map.vertex(exit)).len();
-        gain.rest += model.exit(told.map(|told| told == exit), ways);
+        gain.rest += reported.ln(model, exit, ways);
         gain.rest += match target {
             Target::Known => model.travel(self.map.travel(exit), entry.ln_travel),
             Target::New => model.travel((0, 0), entry.ln_travel),
@@ -414,7 +448,7 @@ impl<const V: usize, const D: usize, const T: usize> Hypothesis<V, D, T> {
     fn visit(&mut self, entry: &Entry, at: u8) {
         let vertex = self.map.vertex(at);
         let found = self.identify(entry, vertex, at);
-        let looks = u8::from(entry.ways.count() > 0);
+        let looks = u8::from(entry.count() > 0);
         if let Some(label) = self.labels.get_mut(usize::from(vertex)) {
             *label = label.including(entry.steps);
             label.looks = label.looks.saturating_add(looks);
@@ -423,7 +457,7 @@ impl<const V: usize, const D: usize, const T: usize> Hypothesis<V, D, T> {
         self.map.turn(at, -reference_off);
         self.map.see(at, 0);
         let base = self.map.bearing(at);
-        for (bearing, (way, off)) in entry.ways.others().zip(found) {
+        for (bearing, (way, off)) in entry.others().zip(found) {
             if way == NONE {
                 if let Some(way) = self.map.add_way(vertex, base.wrapping_add(bearing)) {
                     self.map.see(way, 0);
@@ -458,20 +492,19 @@ fn keyed(map_key: u32, vertex: u8, dart: u8) -> u32 {
 #[cfg(test)]
 mod tests {
     use super::super::config::OrderedConfig;
-    use super::super::observation::{OrderedObservation, WaysSeen};
     use super::*;
-    use crate::place::Fingerprint;
+    use crate::filter::{Observation, Ways};
 
     type Small = Hypothesis<4, 20, 8>;
 
     fn entry(bearings_mrad: &[u16]) -> Entry {
-        let ways = WaysSeen::from_bearings_mrad(bearings_mrad).unwrap();
-        Entry::new(&OrderedObservation { ways, ..OrderedObservation::new(Fingerprint::from_steps(500).unwrap()) })
+        let ways = Ways::from_bearings_mrad(bearings_mrad).ok();
+        Entry::new(&Observation { ways, ..Observation::new(Fingerprint::from_steps(500).unwrap()) })
     }
 
     /// A vertex whose ways have bearings in radians and were seen so often.
     fn vertex(ways: &[(f64, u8)], looks: u8) -> Small {
-        let mut hypothesis = Small::NONE;
+        let mut hypothesis = Small::ZERO;
         let vertex = hypothesis.map.add_vertex().unwrap();
         for &(bearing_rad, seen) in ways {
             let bearing = (bearing_rad / core::f64::consts::TAU * 65536.0) as u16;

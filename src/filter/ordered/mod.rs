@@ -10,7 +10,7 @@ mod fold;
 mod hypothesis;
 mod model;
 mod noise;
-mod observation;
+mod publish;
 mod record;
 mod repair;
 mod replay;
@@ -18,15 +18,17 @@ mod replay;
 mod tests;
 
 pub use config::OrderedConfig;
-pub use observation::{OrderedObservation, WaysSeen};
 
+use super::vertex_ids::VertexIds;
+use super::{Exit, Filter, FilterCapacities, Observation, Update, WorstNgram, worst_ngram};
 use crate::config_error::ConfigError;
-use crate::map::darts::DartMap;
-use crate::place::Fingerprint;
+use crate::fault::{FaultCounters, FaultKind};
+use crate::map::darts::{DartMap, NONE};
+use crate::map::{DartId, Darts, Map, PerVertex, VertexId};
 use beam::Beam;
 use fold::Union;
 use hypothesis::Hypothesis;
-use model::Model;
+use model::{Model, SAME_WAY};
 use record::{Entry, Record};
 use repair::Repair;
 use replay::Translation;
@@ -34,17 +36,36 @@ use replay::Translation;
 /// The noise is estimated at every fifth place from here on.
 const NOISE_FROM: u32 = 10;
 
-/// The ordered filter with at most `N` hypotheses, maps of at most `V` vertices and `D` darts, and the newest `T` places as
-/// evidence that can still be explained in another way.
+/// The ordered filter with at most `N` hypotheses, maps of at most `V` vertices (1 to 64) and `D` darts (2 to 254), and a history of
+/// the newest `T` places. Repairs can revise what the history contains.
 ///
-/// Memory: about `(N + 3) · (20 · V + 8 · D + T)` bytes and 12 bytes a place of the record.
+/// The filter is const-constructed, to zero, so that a `static` of it is in `.bss`, and initialised in place by [`Filter::start`]. Memory:
+/// about `(N + 4) · (20 · V + 8 · D + T)` bytes and 12 bytes a place of the history. The same observations, seed and calls of
+/// [`Filter::refine`] give the same result on every target.
+///
+/// ```
+/// use toposlam::{Exit, Filter, Fingerprint, Observation, OrderedConfig, OrderedFilter, Ways};
+///
+/// let mut filter = OrderedFilter::<6, 12, 60, 64>::new();
+/// filter.start(OrderedConfig::DEFAULT, 1)?;
+/// // A corridor between two dead ends.
+/// for radius_mm in [1200, 2200, 1204, 2196, 1200] {
+///     let fingerprint = Fingerprint::from_radius_mm(radius_mm)?;
+///     let ways = Some(Ways::from_bearings_mrad(&[])?);
+///     filter.observe(Observation { ways, exit: Some(Exit::Back), ..Observation::new(fingerprint) });
+///     filter.refine();
+/// }
+/// assert_eq!(filter.map().vertices().len(), 2);
+/// let darts = filter.darts().unwrap();
+/// assert_eq!((darts.edges().count(), darts.frontiers().count()), (1, 0));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Clone, Debug)]
 pub struct OrderedFilter<const N: usize, const V: usize, const D: usize, const T: usize> {
+    config: OrderedConfig,
     seed: u64,
     observed: u32,
     refined: u32,
-    /// Places at which a vertex found no room.
-    full: u32,
     model: Model,
     record: Record<T>,
     beam: Beam<N, V, D, T>,
@@ -55,61 +76,80 @@ pub struct OrderedFilter<const N: usize, const V: usize, const D: usize, const T
     repair: Repair,
     /// The best hypothesis before the record begins.
     base: Hypothesis<V, D, T>,
+    vertex_ids: VertexIds<V>,
+    /// The published map as a graph, and with its ways.
+    map: Map<V>,
+    darts: DartMap<V, D>,
+    /// The published way by which the robot came to each place of the record; [`NONE`] where that is unknown.
+    path: [u8; T],
+    /// The published way by which it came to the newest place.
+    at: u8,
+    worst: WorstNgram,
+    belief_q16: PerVertex<u32, V>,
+    map_probability_q16: u32,
+    faults: FaultCounters,
 }
 
 impl<const N: usize, const V: usize, const D: usize, const T: usize> OrderedFilter<N, V, D, T> {
-    /// A filter that waits for [`OrderedFilter::start`].
+    /// A filter that ignores observations until [`Filter::start`].
     pub const fn new() -> Self {
+        const {
+            assert!(N >= 1 && N <= 255, "a filter has 1 to 255 hypotheses");
+            assert!(T >= 8 && T <= 16384, "a history has 8 to 16384 places");
+        }
         Self {
+            config: OrderedConfig::UNSET,
             seed: 0,
             observed: 0,
             refined: 0,
-            full: 0,
             model: Model::new(),
             record: Record::new(),
             beam: Beam::new(),
-            draft: Hypothesis::NONE,
-            source: Hypothesis::NONE,
+            draft: Hypothesis::ZERO,
+            source: Hypothesis::ZERO,
             translation: Translation::new(),
             union: Union::new(),
             repair: Repair::NONE,
-            base: Hypothesis::NONE,
+            base: Hypothesis::ZERO,
+            vertex_ids: VertexIds::new(),
+            map: Map::new(),
+            darts: DartMap::EMPTY,
+            path: [0; T],
+            at: 0,
+            worst: WorstNgram::NONE,
+            belief_q16: PerVertex::filled(0),
+            map_probability_q16: 0,
+            faults: FaultCounters::new(),
         }
     }
 
-    /// Resets the filter, with a configuration and the seed of its random draws.
-    ///
-    /// # Errors
-    /// [`ConfigError`] names the first field that is out of its range; the filter does not change then.
-    pub fn start(&mut self, config: OrderedConfig, seed: u64) -> Result<(), ConfigError> {
-        config.check()?;
-        self.seed = seed;
-        self.observed = 0;
-        self.refined = 0;
-        self.full = 0;
-        self.model.configure(&config);
-        self.record.clear();
-        self.beam.clear();
-        self.base.clear();
-        self.repair = Repair::NONE;
-        Ok(())
+    /// How many places were observed.
+    pub const fn observed(&self) -> u32 {
+        self.observed
     }
 
-    /// Takes the next place.
-    pub fn observe(&mut self, observation: &OrderedObservation) {
-        if self.record.is_full() {
-            self.drop_oldest();
+    /// Takes hints that contradict the place before out of an observation, and records the faults.
+    fn checked(&mut self, mut observation: Observation) -> Observation {
+        if observation.travel_frames == Some(0) {
+            self.faults.record(FaultKind::InvalidHint);
+            observation.travel_frames = None;
         }
-        let index = self.record.len();
-        self.record.push(Entry::new(observation));
-        if self.beam.grow(&self.model, &self.record, index) {
-            self.full += 1;
+        observation.starts_sequence |= self.observed == 0;
+        if observation.starts_sequence {
+            (observation.exit, observation.travel_frames) = (None, None);
         }
-        self.refined = 0;
-        self.observed += 1;
-        if self.observed >= NOISE_FROM && self.observed.is_multiple_of(5) {
-            self.estimate_noise();
+        let before = self.record.get(self.record.len().wrapping_sub(1));
+        if let Some(Exit::Bearing(bearing)) = observation.exit
+            && before.count() > 0
+        {
+            let bearing = u16::from(bearing) << 8;
+            let off = |way: u16| (way.wrapping_sub(bearing) as i16).unsigned_abs();
+            if !core::iter::once(0).chain(before.others()).any(|way| off(way) <= SAME_WAY) {
+                self.faults.record(FaultKind::InvalidHint);
+                observation.exit = None;
+            }
         }
+        observation
     }
 
     /// Drops the oldest quarter of the record. The best hypothesis decides what it meant; its counts stay, as the base of all
@@ -137,6 +177,7 @@ impl<const N: usize, const V: usize, const D: usize, const T: usize> OrderedFilt
         self.draft.rest -= forgotten;
         self.draft.forget_oldest(dropped);
         self.record.drop_oldest(dropped);
+        self.path.copy_within(dropped.min(T).., 0);
         self.beam.begin_with(&self.draft);
     }
 
@@ -152,38 +193,19 @@ impl<const N: usize, const V: usize, const D: usize, const T: usize> OrderedFilt
         }
         let limit = noise::returning_deviation(&self.record).map_or(150.0, |deviation| 1.5 * deviation);
         self.model.set_noise(libm::sqrtf(scatter / freedom).min(limit).clamp(2.0, 150.0));
+        self.weigh_labels();
+    }
+
+    /// Computes the evidence of all labels again, for another scale of the noise.
+    fn weigh_labels(&mut self) {
         let model = &self.model;
         self.beam.each(|hypothesis| hypothesis.weigh_labels(model));
         self.beam.sort();
     }
 
-    /// The best map.
-    pub fn map(&self) -> &DartMap<V, D> {
-        &self.beam.get(0).unwrap_or(&self.draft).map
-    }
-
-    /// The way by which the robot came to each place of the record by the best hypothesis, the oldest first; 255 where that is
-    /// open.
-    pub fn path(&self) -> &[u8] {
-        self.beam.get(0).and_then(|best| best.path.get(..self.record.len())).unwrap_or(&[])
-    }
-
-    /// The score of the best hypothesis.
-    pub fn score(&self) -> f32 {
-        self.beam.get(0).map_or(0.0, Hypothesis::score)
-    }
-
-    /// The noise in force in millimetres.
-    pub fn noise_mm(&self) -> f32 {
-        self.model.labels.noise_steps() * f32::from(Fingerprint::STEP_MM)
-    }
-
-    /// How often a vertex found no room.
-    pub fn full(&self) -> u32 {
-        self.full
-    }
-
     /// Replaces all hypotheses by one that takes the places for given vertices and ways of a map; for evaluations.
+    #[doc(hidden)]
+    #[cfg(feature = "_test")]
     pub fn assume(&mut self, map: &DartMap<V, D>, path: &[u8]) -> Option<f32> {
         self.source.clear();
         self.source.map = map.clone();
@@ -193,7 +215,120 @@ impl<const N: usize, const V: usize, const D: usize, const T: usize> OrderedFilt
         self.rebuild(0, path.len())?;
         self.repair = Repair::NONE;
         self.beam.begin_with(&self.draft);
+        self.publish();
         Some(self.draft.score())
+    }
+}
+
+/// Vertices keep their ids from update to update as long as most of their visits stay together.
+impl<const N: usize, const V: usize, const D: usize, const T: usize> Filter<V> for OrderedFilter<N, V, D, T> {
+    type Config = OrderedConfig;
+
+    const UNSTARTED: Self = Self::new();
+
+    fn capacities(_: &OrderedConfig) -> FilterCapacities {
+        FilterCapacities { hypotheses: N as u16, history: T as u16, ngram_length: worst_ngram::LENGTH as u8 }
+    }
+
+    fn start(&mut self, config: OrderedConfig, seed: u64) -> Result<(), ConfigError> {
+        config.check()?;
+        self.config = config;
+        self.seed = seed;
+        self.observed = 0;
+        self.refined = 0;
+        self.model.configure(&config);
+        self.record.clear();
+        self.beam.clear();
+        self.base.clear();
+        self.repair = Repair::NONE;
+        self.vertex_ids.clear();
+        self.map.clear();
+        self.darts.clear();
+        self.at = NONE;
+        self.worst = WorstNgram::NONE;
+        self.belief_q16.fill(0);
+        self.map_probability_q16 = 0;
+        self.faults = FaultCounters::new();
+        Ok(())
+    }
+
+    /// Computes the evidence of all labels again. The other evidence of the places so far stays as it is, and the estimate of the
+    /// noise starts again from the configured value.
+    fn set_config(&mut self, config: OrderedConfig) -> Result<(), ConfigError> {
+        config.check()?;
+        self.config = config;
+        self.model.configure(&config);
+        self.weigh_labels();
+        Ok(())
+    }
+
+    /// Cost: for each of N hypotheses the explanations of one place, O(D) each; when the history is full, a pass over it as well.
+    fn observe(&mut self, observation: impl Into<Observation>) -> Update {
+        if self.beam.is_empty() {
+            return Update::NONE;
+        }
+        let observation = self.checked(observation.into());
+        if self.record.is_full() {
+            self.faults.record(FaultKind::HistoryFull);
+            self.drop_oldest();
+        }
+        let index = self.record.len();
+        self.record.push(Entry::new(&observation));
+        if self.beam.grow(&self.model, &self.record, index) {
+            self.faults.record(FaultKind::VerticesFull);
+        }
+        self.refined = 0;
+        self.observed = self.observed.wrapping_add(1);
+        if self.observed >= NOISE_FROM && self.observed.is_multiple_of(5) {
+            self.estimate_noise();
+        }
+        self.publish()
+    }
+
+    /// Runs a part of a repair, or all of it if it is short. Cost: at most 300 places that are followed, or 25 decisions.
+    fn refine(&mut self) {
+        self.repair();
+    }
+
+    fn map(&self) -> &Map<V> {
+        &self.map
+    }
+
+    fn darts(&self) -> Option<Darts<'_>> {
+        Some(self.darts.view())
+    }
+
+    fn arrival(&self) -> Option<DartId> {
+        if self.beam.is_empty() { None } else { DartId::new(self.at) }
+    }
+
+    fn faults(&self) -> &FaultCounters {
+        &self.faults
+    }
+
+    fn recent(&self, ago: usize) -> Option<VertexId> {
+        let index = self.record.len().checked_sub(ago)?.checked_sub(1)?;
+        VertexId::new(self.darts.vertex(*self.path.get(index)?))
+    }
+
+    fn vertex_probability_q16(&self, vertex: VertexId) -> u32 {
+        self.belief_q16.get(vertex).copied().unwrap_or(0)
+    }
+
+    fn map_probability_q16(&self) -> u32 {
+        self.map_probability_q16
+    }
+
+    fn remapped(&self, before: VertexId) -> Option<VertexId> {
+        self.vertex_ids.remapped(before)
+    }
+
+    fn worst(&self) -> WorstNgram {
+        self.worst
+    }
+
+    fn is_in_doubt(&self) -> bool {
+        self.has_unexplained_ngram()
     }
 }
 

@@ -66,9 +66,9 @@ pub(super) struct Model {
     missed_share: f32,
     bearings: Predictive,
     travels: Predictive,
-    /// ln P of the exit that was told, and of another one of one other, two others and so on.
-    told: f32,
-    not_told: [f32; 8],
+    /// ln P of a right report of the exit, and of a wrong one of one other way, two others and so on.
+    pub(super) right_exit: f32,
+    wrong_exit: [f32; 8],
     /// ln k.
     pub(super) ln: [f32; 256],
     missed: f32,
@@ -94,8 +94,8 @@ impl Model {
             labels: LabelModel::new(),
             bearings: Predictive::new(),
             travels: Predictive::new(),
-            told: 0.0,
-            not_told: [0.0; 8],
+            right_exit: 0.0,
+            wrong_exit: [0.0; 8],
             ln: [0.0; 256],
             missed: 0.0,
             false_way: 0.0,
@@ -111,8 +111,8 @@ impl Model {
         self.bearings.set(self.bearing_rad);
         self.travels.set(share(config.travel_noise_permille));
         let wrong_exit = share(config.wrong_exit_permille);
-        self.told = libm::logf(1.0 - wrong_exit);
-        for (others, slot) in self.not_told.iter_mut().enumerate() {
+        self.right_exit = libm::logf(1.0 - wrong_exit);
+        for (others, slot) in self.wrong_exit.iter_mut().enumerate() {
             *slot = libm::logf(wrong_exit / others.max(1) as f32);
         }
         for (count, slot) in self.ln.iter_mut().enumerate() {
@@ -129,19 +129,13 @@ impl Model {
         let label = -0.5 * libm::logf(2.0 * core::f32::consts::PI * 1.3 * noise_steps * noise_steps) - 0.5;
         let way = self.bearings.ln(3, 0.0) - 0.5 - self.missed_share * 3.0 - 0.1;
         for (ways, par) in self.par.iter_mut().enumerate() {
-            *par = label + way * ways.saturating_sub(1) as f32 + self.told;
+            *par = label + way * ways.saturating_sub(1) as f32 + self.right_exit;
         }
     }
 
-    /// ln P of leaving by one of `ways` ways, each of which is as likely as another, when this one was told, or another one, or
-    /// none.
-    pub(super) fn exit(&self, told: Option<bool>, ways: usize) -> f32 {
-        let told = match told {
-            Some(true) => self.told,
-            Some(false) => self.not_told.get(ways.saturating_sub(1)).copied().unwrap_or(-9.0),
-            None => 0.0,
-        };
-        told - self.ln_of(ways)
+    /// ln P of a wrong report of the exit that names one of `others` other ways.
+    pub(super) fn ln_wrong_exit(&self, others: usize) -> f32 {
+        self.wrong_exit.get(others).copied().unwrap_or(-9.0)
     }
 
     /// ln P that an edge joins a given one of so many frontiers to another one.

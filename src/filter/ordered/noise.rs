@@ -1,6 +1,7 @@
 //! The scale of the noise, taken from what was observed.
 
 use super::record::Record;
+use crate::filter::Exit;
 
 /// Differences from this many steps on are counted as one.
 const DIFFERENCES: usize = 128;
@@ -17,7 +18,7 @@ pub(super) fn returning_deviation<const T: usize>(record: &Record<T>) -> Option<
     let mut counts = [0_u16; DIFFERENCES];
     let mut returns = 0_u16;
     for last in 2..record.len() {
-        if record.get(last).starts() || record.get(last - 1).starts() || record.get(last).exit() != Some(0) {
+        if record.get(last).starts() || record.get(last - 1).starts() || !record.get(last).exit().is_some_and(Exit::is_back) {
             continue;
         }
         let difference = record.get(last).steps.abs_diff(record.get(last - 2).steps);

@@ -1,49 +1,92 @@
 //! The newest observations, packed: what every hypothesis explains.
 
-use super::observation::{OrderedObservation, WaysSeen};
-use crate::map::darts::Bearing;
+use crate::filter::{Exit, Observation, Ways};
+use crate::map::darts::{Bearing, WAYS};
 
 /// Units of ln(travel time): 2⁻¹² nats.
 pub(super) const LN_UNIT: f32 = 4096.0;
 
+/// Flags beside the number of ways, which takes bits 0 to 3.
+const STARTS: u8 = 1 << 4;
+const KIDNAPPED: u8 = 1 << 5;
+const EXIT_ON: u8 = 1 << 6;
+const EXIT_BEARING: u8 = 1 << 7;
+
 /// One observation as the inference reads it: 12 bytes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) struct Entry {
-    pub(super) steps: u16,
+pub(crate) struct Entry {
+    pub(crate) steps: u16,
     /// ln of the travel time in [`LN_UNIT`]; 0 when it is unknown.
-    pub(super) ln_travel: u16,
-    pub(super) ways: WaysSeen,
-    exit_and_start: u8,
+    pub(crate) ln_travel: u16,
+    /// The bytes of the ways. The first one holds the flags too.
+    ways: [u8; WAYS],
+    exit: u8,
 }
 
 impl Entry {
-    pub(super) const NONE: Self = Self { steps: 0, ln_travel: 0, ways: WaysSeen::UNKNOWN, exit_and_start: 0 };
+    pub(super) const NONE: Self = Self { steps: 0, ln_travel: 0, ways: [0; WAYS], exit: 0 };
 
-    pub(super) fn new(observation: &OrderedObservation) -> Self {
+    pub(super) fn new(observation: &Observation) -> Self {
         let frames = observation.travel_frames.unwrap_or(0);
-        let exit = observation.exit.map_or(0, |exit| exit.min(0x3E) + 1);
+        let mut ways = observation.ways.map_or([0; WAYS], Ways::to_bytes);
+        let (exit_flag, exit) = match observation.exit {
+            None => (0, 0),
+            Some(Exit::On) => (EXIT_ON, 0),
+            Some(Exit::Back) => (EXIT_BEARING, 0),
+            Some(Exit::Bearing(bearing)) => (EXIT_BEARING, bearing),
+        };
+        let start_flag = if observation.starts_sequence { STARTS } else { 0 };
+        let [flags, ..] = &mut ways;
+        *flags |= exit_flag | start_flag;
         Self {
             steps: observation.fingerprint.steps(),
             // One frame would be 0, which stands for unknown.
             ln_travel: if frames == 0 { 0 } else { (libm::logf(frames.into()) * LN_UNIT) as u16 + 1 },
-            ways: observation.ways,
-            exit_and_start: exit << 1 | u8::from(observation.starts_sequence),
+            ways,
+            exit,
         }
     }
 
-    pub(super) const fn starts(&self) -> bool {
-        self.exit_and_start & 1 == 1
+    const fn flags(&self) -> u8 {
+        let [flags, ..] = self.ways;
+        flags
     }
 
-    /// By which of the ways seen at the place before the robot left it.
-    pub(super) fn exit(&self) -> Option<u8> {
-        (self.exit_and_start >> 1).checked_sub(1)
+    /// Whether the robot did not drive here from the place before.
+    pub(crate) const fn starts(&self) -> bool {
+        self.flags() & (STARTS | KIDNAPPED) != 0
+    }
+
+    /// The ways seen.
+    pub(super) fn ways(&self) -> Option<Ways> {
+        Ways::from_bytes(self.ways)
+    }
+
+    /// The number of ways seen with their bearings, including the one the robot came by; 0 when they are unknown.
+    pub(super) fn count(&self) -> u8 {
+        self.ways().filter(|ways| ways.others().is_some()).map_or(0, Ways::count)
+    }
+
+    /// The bearings of the other ways relative to the one the robot came by.
+    pub(super) fn others(&self) -> impl Iterator<Item = Bearing> + '_ {
+        let others = self.ways.get(1..usize::from(self.count())).unwrap_or(&[]);
+        others.iter().map(|&bearing| u16::from(bearing) << 8)
+    }
+
+    /// The exit by which the robot left the place before.
+    pub(super) fn exit(&self) -> Option<Exit> {
+        match self.flags() {
+            flags if flags & EXIT_BEARING != 0 && self.exit == 0 => Some(Exit::Back),
+            flags if flags & EXIT_BEARING != 0 => Some(Exit::Bearing(self.exit)),
+            flags if flags & EXIT_ON != 0 => Some(Exit::On),
+            _ => None,
+        }
     }
 }
 
 /// The newest `T` observations, the oldest first.
 #[derive(Clone, Debug)]
-pub(super) struct Record<const T: usize> {
+pub(crate) struct Record<const T: usize> {
     entries: [Entry; T],
     len: usize,
 }
@@ -57,7 +100,7 @@ impl<const T: usize> Record<T> {
         self.len = 0;
     }
 
-    pub(super) fn len(&self) -> usize {
+    pub(crate) fn len(&self) -> usize {
         self.len
     }
 
@@ -79,13 +122,37 @@ impl<const T: usize> Record<T> {
         self.len -= count;
     }
 
-    pub(super) fn get(&self, index: usize) -> Entry {
+    pub(crate) fn get(&self, index: usize) -> Entry {
         self.entries.get(..self.len).and_then(|entries| entries.get(index)).copied().unwrap_or(Entry::NONE)
     }
 
-    /// The bearing, relative to the way the robot came by, of the way by which it left for observation `index`.
-    pub(super) fn exit_bearing(&self, index: usize) -> Option<Bearing> {
-        let exit = self.get(index).exit()?;
-        self.get(index.checked_sub(1)?).ways.bearing(exit)
+    /// Notes whether the robot seems to have been kidnapped on the way to an observation.
+    pub(super) fn set_kidnapped(&mut self, index: usize, is_kidnapped: bool) {
+        if let Some(entry) = self.entries.get_mut(index) {
+            let [flags, ..] = &mut entry.ways;
+            *flags = if is_kidnapped { *flags | KIDNAPPED } else { *flags & !KIDNAPPED };
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::place::Fingerprint;
+
+    #[test]
+    fn entries_hold_what_was_observed() {
+        let all_ways = [None, Ways::from_count(7).ok(), Ways::from_bearings_mrad(&[1000, 3000]).ok()];
+        for ways in all_ways {
+            for exit in [None, Some(Exit::Back), Some(Exit::On), Some(Exit::Bearing(200))] {
+                for starts_sequence in [false, true] {
+                    let fingerprint = Fingerprint::from_steps(77).unwrap();
+                    let observation = Observation { ways, exit, starts_sequence, ..Observation::new(fingerprint) };
+                    let entry = Entry::new(&observation);
+                    assert_eq!((entry.ways(), entry.exit(), entry.starts()), (ways, exit, starts_sequence));
+                    assert_eq!(entry.steps, 77);
+                }
+            }
+        }
     }
 }

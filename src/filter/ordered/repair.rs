@@ -71,7 +71,7 @@ impl<const N: usize, const V: usize, const D: usize, const T: usize> OrderedFilt
     /// takes what comes out.
     ///
     /// Cost: at most `WORK` places or `WORK / DECISION` decisions; the choice of a fold is O(V² + D²).
-    pub fn refine(&mut self) {
+    pub(super) fn repair(&mut self) {
         if self.record.len() < 3 {
             return;
         }

@@ -1,8 +1,9 @@
 //! Building a map again from the record: along a given path, or by decisions that look ahead.
 
-use super::hypothesis::{Choice, Gain, Hypothesis, Target};
+use super::hypothesis::{Choice, Gain, Hypothesis, ReportedExit, Target};
 use super::model::{Model, SAME_WAY};
 use super::record::Record;
+use crate::filter::Exit;
 use crate::map::darts::NONE;
 
 /// A visit that gains so much less than one that is explained rightly calls for a decision, in nats.
@@ -36,7 +37,7 @@ pub(super) struct Translation<const V: usize, const D: usize> {
 
 impl<const V: usize, const D: usize> Translation<V, D> {
     pub(super) const fn new() -> Self {
-        Self { vertex: [NONE; V], dart: [NONE; D], is_image: [false; D] }
+        Self { vertex: [0; V], dart: [0; D], is_image: [false; D] }
     }
 
     /// Starts with the first vertices and darts, which are the same in both maps.
@@ -147,10 +148,13 @@ impl<const V: usize, const D: usize, const T: usize> Builder<'_, V, D, T> {
     ) -> Option<Step> {
         let choice = self.translated(from, to, index).filter(|&choice| to.has_room(choice))?;
         let entry = self.record.get(index);
-        let told = if choice.exit == NONE { None } else { to.told_way(self.record, index, to.at) };
-        let gain = to.gain(self.model, &entry, told, choice);
-        let par = self.model.par(entry.ways.count(), entry.ln_travel > 0) + SURPRISE;
-        let is_expected = choice.target == Target::Known && told == Some(choice.exit) && gain.total() > par - 1.0;
+        let reported = match choice.exit {
+            NONE => ReportedExit::Unknown,
+            _ => to.reported_exit(self.record, index, to.at),
+        };
+        let gain = to.gain(self.model, &entry, reported, choice);
+        let par = self.model.par(entry.count(), entry.ln_travel > 0) + SURPRISE;
+        let is_expected = choice.target == Target::Known && reported == ReportedExit::Way(choice.exit) && gain.total() > par - 1.0;
         Some(Step { choice, gain, is_decision: !is_expected && index > 0 })
     }
 
@@ -208,14 +212,14 @@ impl<const V: usize, const D: usize, const T: usize> Builder<'_, V, D, T> {
         mut noise: impl FnMut() -> f32,
     ) -> Option<(Target, bool)> {
         let entry = self.record.get(index);
-        let par = self.model.par(entry.ways.count(), entry.ln_travel > 0);
+        let par = self.model.par(entry.count(), entry.ln_travel > 0);
         if to.at != NONE
             && !entry.starts()
-            && let Some(told) = to.told_way(self.record, index, to.at)
-            && to.map.partner(told).is_some()
+            && let reported @ ReportedExit::Way(exit) = to.reported_exit(self.record, index, to.at)
+            && to.map.partner(exit).is_some()
         {
-            let choice = Choice { exit: told, target: Target::Known };
-            let gain = to.gain(self.model, &entry, Some(told), choice);
+            let choice = Choice { exit, target: Target::Known };
+            let gain = to.gain(self.model, &entry, reported, choice);
             let ways = self.model.ln_of(to.map.ways(to.map.vertex(to.at)).len());
             if gain.total() > par + SURPRISE - ways && forbidden != Some(choice) {
                 to.extend(&entry, index, choice, gain, 0);
@@ -291,7 +295,7 @@ impl<const V: usize, const D: usize, const T: usize> Builder<'_, V, D, T> {
                 gain
             }
             // From a new vertex the only known way leads back.
-            Target::New if choice.exit != NONE && self.record.exit_bearing(index + 1) == Some(0) => {
+            Target::New if choice.exit != NONE && self.record.get(index + 1).exit().is_some_and(Exit::is_back) => {
                 self.arrive(on, index + 1, choice.exit) + self.follow_known(on, index + 1, choice.exit)
             }
             Target::New => -OPEN,
@@ -300,7 +304,7 @@ impl<const V: usize, const D: usize, const T: usize> Builder<'_, V, D, T> {
 
     fn arrive(&self, on: &Hypothesis<V, D, T>, index: usize, at: u8) -> f32 {
         let entry = self.record.get(index);
-        let par = self.model.par(entry.ways.count(), false);
+        let par = self.model.par(entry.count(), false);
         (on.arrival(self.model, &entry, at).total() - par).max(ROLLOUT_WORST)
     }
 
@@ -325,29 +329,31 @@ impl<const V: usize, const D: usize, const T: usize> Builder<'_, V, D, T> {
     /// compared with a place that is explained rightly; [`NONE`] where nobody has driven.
     fn known_step(&self, on: &Hypothesis<V, D, T>, index: usize, at: u8) -> (f32, u8) {
         let entry = self.record.get(index);
-        let told = on.told_way(self.record, index, at);
-        let par = self.model.par(entry.ways.count(), entry.ln_travel > 0);
+        let reported = on.reported_exit(self.record, index, at);
+        let par = self.model.par(entry.count(), entry.ln_travel > 0);
         let gain = |partner: u8| {
             on.arrival(self.model, &entry, partner).total() + self.model.travel(on.map.travel(partner), entry.ln_travel)
                 - par
         };
         let mut best = (f32::NEG_INFINITY, NONE);
-        if let Some(told) = told {
-            let Some(partner) = on.map.partner(told) else { return (-OPEN, NONE) };
+        if let ReportedExit::Way(exit) = reported {
+            let Some(partner) = on.map.partner(exit) else { return (-OPEN, NONE) };
             best = (gain(partner), partner);
         }
         if best.0 < DOUBT {
-            // Another exit than the one that was told, or any when none was.
+            // Another exit than the reported one.
             let ways = on.map.ways(on.map.vertex(at));
-            let cost = match told {
-                Some(_) => self.model.exit(Some(false), ways.len()) + self.model.ln_of(ways.len()),
-                None => 0.0,
-            };
-            for &exit in ways.iter().filter(|&&exit| told != Some(exit)) {
+            let others = ways.len().saturating_sub(1);
+            for &exit in ways.iter().filter(|&&exit| reported != ReportedExit::Way(exit)) {
+                let cost = match reported {
+                    ReportedExit::Way(_) => self.model.ln_wrong_exit(others),
+                    ReportedExit::NotBack(came_by) if exit == came_by => self.model.ln_wrong_exit(1),
+                    ReportedExit::NotBack(_) | ReportedExit::Unknown => 0.0,
+                };
                 let other = match on.map.partner(exit) {
                     Some(partner) => (cost + gain(partner), partner),
                     // It may have led anywhere.
-                    None if told.is_none() => (-OPEN, NONE),
+                    None if !matches!(reported, ReportedExit::Way(_)) => (cost - OPEN, NONE),
                     None => continue,
                 };
                 if other.0 > best.0 {

@@ -1,12 +1,13 @@
 //! The ordered filter as a whole, on small buildings whose darts are known.
 
 use super::*;
-use crate::filter::draws;
+use crate::filter::{Ways, draws};
+use crate::place::Fingerprint;
 use std::collections::{BTreeMap, BTreeSet};
 
 const CONFIG: OrderedConfig = OrderedConfig::DEFAULT.with_noise_mm(20);
 
-type Filter = OrderedFilter<6, 12, 60, 64>;
+type Small = OrderedFilter<6, 12, 60, 64>;
 
 /// A building: for each place a radius in steps and its ways counter-clockwise as (bearing in mrad, dart it leads to, ring
 /// frames). Darts are numbered through all places.
@@ -45,7 +46,7 @@ impl Building {
     }
 
     /// What the robot sees that came by a dart, and the dart it came by, for a walk of random exits.
-    fn walk(&self, length: usize, seed: u64, wrong: impl Fn(usize) -> bool) -> Vec<(usize, OrderedObservation)> {
+    fn walk(&self, length: usize, seed: u64, wrong: impl Fn(usize) -> bool) -> Vec<(usize, Observation)> {
         let mut random = draws(seed, 7);
         let mut at = 0;
         let mut exit = None;
@@ -65,17 +66,17 @@ impl Building {
                 others.sort_unstable();
                 let bearings: Vec<u16> = others.iter().map(|&(bearing, _)| bearing).collect();
                 let noise = (rand_core::Rng::next_u32(&mut random) % 9) as u16;
-                let observation = OrderedObservation {
-                    ways: WaysSeen::from_bearings_mrad(&bearings).unwrap(),
+                let observation = Observation {
+                    ways: Ways::from_bearings_mrad(&bearings).ok(),
                     exit,
                     travel_frames: frames,
                     starts_sequence: step == 0,
-                    ..OrderedObservation::new(Fingerprint::from_steps(self.radius_steps[place] + noise).unwrap())
+                    ..Observation::new(Fingerprint::from_steps(self.radius_steps[place] + noise).unwrap())
                 };
                 let came_by = at;
                 let chosen = rand_core::Rng::next_u32(&mut random) as usize % ways.len();
                 let told = if wrong(step) { (chosen + 1) % ways.len() } else { chosen };
-                exit = Some(told as u8);
+                exit = Some(told.checked_sub(1).map_or(Exit::Back, |other| Exit::from_bearing_mrad(others[other].0).unwrap()));
                 let leaves = if chosen == 0 { at } else { others[chosen - 1].1 };
                 frames = Some(self.way(leaves).2);
                 at = self.way(leaves).1;
@@ -88,13 +89,13 @@ impl Building {
     fn is_mapped<const N: usize, const V: usize, const D: usize, const T: usize>(
         &self,
         filter: &OrderedFilter<N, V, D, T>,
-        walk: &[(usize, OrderedObservation)],
+        walk: &[(usize, Observation)],
     ) -> bool {
-        let map = filter.map();
-        let path = filter.path();
-        let mut image: BTreeMap<u8, BTreeSet<usize>> = BTreeMap::new();
+        let map = filter.darts().unwrap();
+        let mut image: BTreeMap<DartId, BTreeSet<usize>> = BTreeMap::new();
         let mut edges = BTreeSet::new();
-        for (&(dart, _), &came_by) in walk.iter().zip(path).skip(1) {
+        for (&(dart, _), came_by) in walk.iter().zip(filter.path()).skip(1) {
+            let Some(came_by) = came_by else { return false };
             let left_by = self.way(dart).1;
             edges.insert(dart.min(left_by));
             image.entry(came_by).or_default().insert(dart);
@@ -107,28 +108,28 @@ impl Building {
     }
 }
 
-fn run(filter: &mut Filter, walk: &[(usize, OrderedObservation)]) {
+fn run(filter: &mut Small, walk: &[(usize, Observation)]) {
     for (_, observation) in walk {
-        filter.observe(observation);
+        filter.observe(*observation);
         (0..4).for_each(|_| filter.refine());
     }
 }
 
 #[test]
 fn loops_and_parallel_corridors_are_mapped() {
-    let mut filter = Box::new(Filter::new());
+    let mut filter = Box::new(Small::new());
     for seed in 0..10 {
         filter.start(CONFIG, seed).unwrap();
         let walk = HOUSE.walk(60, seed, |_| false);
         run(&mut filter, &walk);
-        assert!(HOUSE.is_mapped(&filter, &walk), "seed {seed}: {:?}", filter.map().edges().collect::<Vec<_>>());
-        assert_eq!((filter.map().vertices(), filter.map().genus()), (3, 0));
+        assert!(HOUSE.is_mapped(&filter, &walk), "seed {seed}: {:?}", filter.darts().unwrap().edges().collect::<Vec<_>>());
+        assert_eq!((filter.darts.vertices(), filter.darts.genus()), (3, 0));
     }
 }
 
 #[test]
 fn a_wrong_exit_costs_no_map() {
-    let mut filter = Box::new(Filter::new());
+    let mut filter = Box::new(Small::new());
     let mut right = 0;
     for seed in 0..10 {
         filter.start(CONFIG, seed).unwrap();
@@ -141,20 +142,21 @@ fn a_wrong_exit_costs_no_map() {
 
 #[test]
 fn contradictory_hints_at_every_place_leave_a_hypothesis_and_the_next_walk_is_mapped() {
-    let mut filter = Box::new(Filter::new());
+    let mut filter = Box::new(Small::new());
     filter.start(CONFIG, 3).unwrap();
     for step in 0..150_u16 {
-        let observation = OrderedObservation {
-            ways: WaysSeen::from_bearings_mrad(&[100 + step * 37 % 900, 3000, 3001 + step * 91 % 3000]).unwrap(),
-            exit: Some((step % 5) as u8),
+        let observation = Observation {
+            ways: Ways::from_bearings_mrad(&[100 + step * 37 % 900, 3000, 3001 + step * 91 % 3000]).ok(),
+            exit: Some(Exit::Bearing((step * 51 % 256) as u8)),
             travel_frames: Some(1 + step * 57 % 900),
-            ..OrderedObservation::new(Fingerprint::from_steps((u32::from(step) * 773 % 4000) as u16).unwrap())
+            ..Observation::new(Fingerprint::from_steps((u32::from(step) * 773 % 4000) as u16).unwrap())
         };
-        filter.observe(&observation);
+        filter.observe(observation);
         filter.refine();
-        assert!(!filter.path().is_empty() && filter.map().vertices() > 0 && filter.score().is_finite());
+        assert!(filter.recent(0).is_some() && filter.map().vertices().len() > 0 && filter.score().is_finite());
     }
-    assert!(filter.full() > 0, "more places than vertices");
+    assert!(filter.faults().count(FaultKind::VerticesFull) > 0, "more places than vertices");
+    assert!(filter.faults().count(FaultKind::InvalidHint) > 0, "exits where no way was seen");
     filter.start(CONFIG, 3).unwrap();
     let walk = HOUSE.walk(60, 3, |_| false);
     run(&mut filter, &walk);
@@ -163,42 +165,44 @@ fn contradictory_hints_at_every_place_leave_a_hypothesis_and_the_next_walk_is_ma
 
 #[test]
 fn a_long_run_keeps_its_map_when_old_places_leave_the_record() {
-    let mut filter = Box::new(Filter::new());
+    let mut filter = Box::new(Small::new());
     filter.start(CONFIG, 5).unwrap();
     run(&mut filter, &HOUSE.walk(2000, 5, |step| step % 50 == 7));
-    let map = filter.map();
+    let map = &filter.darts;
     assert_eq!((map.vertices(), map.edges().count(), map.genus()), (3, 4, 0));
     assert!(filter.score().abs() < 1e4);
 }
 
 #[test]
 fn a_robot_that_is_set_down_elsewhere_finds_its_place_on_the_map() {
-    let mut filter = Box::new(Filter::new());
+    let mut filter = Box::new(Small::new());
     filter.start(CONFIG, 8).unwrap();
     run(&mut filter, &HOUSE.walk(40, 8, |_| false));
     // The second walk starts as the first one did, not where that ended.
     run(&mut filter, &HOUSE.walk(12, 9, |_| false));
-    assert_eq!((filter.map().vertices(), filter.map().edges().count()), (3, 4));
+    assert_eq!((filter.darts.vertices(), filter.darts.edges().count()), (3, 4));
 }
 
 #[test]
 fn the_same_input_gives_the_same_result() {
     let map = |seed| {
-        let mut filter = Box::new(Filter::new());
+        let mut filter = Box::new(Small::new());
         filter.start(CONFIG, seed).unwrap();
         run(&mut filter, &HOUSE.walk(50, 2, |step| step % 9 == 4));
-        (filter.map().clone(), filter.path().to_vec(), filter.score().to_bits())
+        (filter.darts.clone(), filter.path().collect::<Vec<_>>(), filter.score().to_bits())
     };
     assert_eq!(map(1), map(1));
 }
 
 #[test]
 fn a_hypothesis_built_again_along_its_own_path_is_the_same() {
-    let mut filter = Box::new(Filter::new());
+    let mut filter = Box::new(Small::new());
     for seed in 0..5 {
         filter.start(CONFIG, seed).unwrap();
         let walk = HOUSE.walk(9, seed, |step| step % 7 == 4);
-        walk.iter().for_each(|(_, observation)| filter.observe(observation));
+        walk.iter().for_each(|(_, observation)| {
+            filter.observe(*observation);
+        });
         for rank in 0..filter.beam.len() {
             filter.source.clone_from(filter.beam.get(rank).unwrap());
             let score = filter.source.score();

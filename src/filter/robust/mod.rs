@@ -13,7 +13,7 @@
 //! | `step`, `growth`, `beam` | one more observation |
 //! | `proposals`, `merge_proposals`, `split_proposals`, `merge` | refinement |
 //! | `lattice`, `hmm`, `viterbi`, `forward` | paths: the best one, and all |
-//! | `vertex_ids`, `publish`, `worst_ngram` | what is published |
+//! | `publish` | what is published |
 
 pub(crate) mod beam;
 mod column;
@@ -37,13 +37,12 @@ pub(crate) mod statistics;
 mod step;
 #[cfg(feature = "_test")]
 mod testing;
-pub(crate) mod vertex_ids;
 mod viterbi;
-pub(crate) mod worst_ngram;
 
 pub use config::RobustConfig;
 
-use super::{Filter, FilterCapacities, Update, WorstNgram, draws};
+use super::vertex_ids::VertexIds;
+use super::{Filter, FilterCapacities, Update, WorstNgram, draws, worst_ngram};
 use crate::config_error::ConfigError;
 use crate::fault::FaultCounters;
 use crate::filter::Observation;
@@ -58,7 +57,6 @@ use hypothesis::Hypothesis;
 use lattice::Lattice;
 use model::Model;
 use proposals::Proposals;
-use vertex_ids::VertexIds;
 use viterbi::Viterbi;
 
 /// The robust filter with at most `N` hypotheses, maps of at most `V` vertices (2 to 32), and a history of the newest `HISTORY`
@@ -98,7 +96,9 @@ pub struct RobustFilter<const N: usize, const V: usize, const HISTORY: usize> {
     lattice: Lattice,
     viterbi: Viterbi<HISTORY>,
     forward: Forward<V>,
-    pub(crate) vertex_ids: VertexIds<V, HISTORY>,
+    pub(crate) vertex_ids: VertexIds<V>,
+    /// The published vertex of each observation of the history.
+    pub(crate) published_path: [VertexId; HISTORY],
     pub(crate) map: Map<V>,
     pub(crate) worst: WorstNgram,
     pub(crate) belief_q16: PerVertex<u32, V>,
@@ -129,6 +129,7 @@ impl<const N: usize, const V: usize, const HISTORY: usize> RobustFilter<N, V, HI
             viterbi: Viterbi::new(),
             forward: Forward::new(),
             vertex_ids: VertexIds::new(),
+            published_path: [VertexId::FIRST; HISTORY],
             map: Map::new(),
             worst: WorstNgram::NONE,
             belief_q16: PerVertex::filled(0),
@@ -257,7 +258,7 @@ impl<const N: usize, const V: usize, const HISTORY: usize> Filter<V> for RobustF
 
     fn recent(&self, ago: usize) -> Option<VertexId> {
         let index = self.history.len().checked_sub(ago)?.checked_sub(1)?;
-        self.vertex_ids.path.get(index).copied()
+        self.published_path.get(index).copied()
     }
 
     fn vertex_probability_q16(&self, vertex: VertexId) -> u32 {

@@ -1,7 +1,8 @@
 //! What the filter publishes after a place: the best map with its vertex ids, the belief, and the probability of the map.
 
-use super::{RobustFilter, worst_ngram};
-use crate::filter::{RobustFactors, Update, WeightFactors};
+use super::RobustFilter;
+use crate::filter::worst_ngram::worst_ngram;
+use crate::filter::{RobustFactors, Update, WeightFactors, WorstNgram};
 use crate::map::VertexId;
 use crate::place::Fingerprint;
 
@@ -20,11 +21,18 @@ impl<const N: usize, const V: usize, const HISTORY: usize> RobustFilter<N, V, HI
     pub(super) fn publish(&mut self) -> Update {
         let Some(best) = self.beam.best() else { return Update::NONE };
         if self.localise_only {
-            self.vertex_ids.keep(&self.history, best);
+            self.vertex_ids.keep(best.vertices.into());
         } else {
-            self.vertex_ids.update(&self.history, &self.map, best);
+            // The newest observation is not published yet.
+            let published = self.history.len().saturating_sub(1);
+            let observations = self.published_path.iter().copied().zip(best.path).take(published);
+            let label = |vertex| Some(&best.statistics[vertex]).filter(|held| held.visits >= 2).map(|held| held.mean);
+            self.vertex_ids.update::<HISTORY>(&self.map, best.vertices.into(), observations, label);
         }
         let ids = &self.vertex_ids.ids;
+        for (published, &vertex) in self.published_path.iter_mut().zip(&best.path).take(self.history.len()) {
+            *published = ids[vertex];
+        }
         self.map.clear();
         for id in best.vertices() {
             let vertex = best.vertices().find(|&vertex| ids[vertex] == id).unwrap_or(VertexId::FIRST);
@@ -39,7 +47,7 @@ impl<const N: usize, const V: usize, const HISTORY: usize> RobustFilter<N, V, HI
             }
             self.belief_q16[ids[vertex]] = (self.forward.belief[vertex] * ONE_Q16) as u32;
         }
-        self.worst = worst_ngram::worst_ngram(&self.history, &self.map, &self.vertex_ids.path);
+        self.worst = self.find_worst_ngram();
         let (mut same, mut all) = (0.0, 0.0);
         let mut rival = f32::NEG_INFINITY;
         for hypothesis in self.beam.iter() {
@@ -69,9 +77,18 @@ impl<const N: usize, const V: usize, const HISTORY: usize> RobustFilter<N, V, HI
         }
     }
 
+    /// The n-gram that the published map explains worst.
+    pub(crate) fn find_worst_ngram(&self) -> WorstNgram {
+        let place = |index| {
+            let observation = self.history.get(index)?;
+            Some((observation.steps, observation.starts_sequence(), self.published_path.get(index).copied()))
+        };
+        worst_ngram::<V, HISTORY>(self.history.len(), &self.map, place)
+    }
+
     /// The vertex of each of the newest `HISTORY` places on the best path of the last update, the oldest first.
     pub fn path(&self) -> impl Iterator<Item = VertexId> + '_ {
-        self.vertex_ids.path.iter().copied().take(self.history.len())
+        self.published_path.iter().copied().take(self.history.len())
     }
 
     /// The log evidence of the best hypothesis, and the bound of its map's other paths, in nats.

@@ -59,7 +59,7 @@ impl<const N: usize, const V: usize, const HISTORY: usize> RobustFilter<N, V, HI
         let history = &self.history;
         let mut has_decayed = false;
         self.beam.for_each(|hypothesis| has_decayed |= hypothesis.marginalise_oldest(history));
-        self.vertex_ids.drop_oldest();
+        self.published_path.copy_within(1.., 0);
         self.history.drop_oldest();
         // While the filter only localises, the statistics of the map do not change.
         if has_decayed && !self.localise_only {

@@ -7,7 +7,6 @@ mod hypothesis;
 mod parts;
 
 use crate::fault::FaultCounters;
-use crate::filter::robust::worst_ngram;
 use crate::filter::{RobustConfig, RobustFilter};
 use crate::persist::Persist;
 use crate::persist::snapshot::{FILTER_SECTION, FRAME_BYTES, ROBUST, Reader, SnapshotError, Writer};
@@ -133,7 +132,7 @@ impl<const N: usize, const V: usize, const HISTORY: usize> RobustFilter<N, V, HI
             }
         }
         if kept {
-            self.worst = worst_ngram::worst_ngram(&self.history, &self.map, &self.vertex_ids.path);
+            self.worst = self.find_worst_ngram();
         }
         from.finish()
     }

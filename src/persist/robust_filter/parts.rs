@@ -170,7 +170,7 @@ impl<const N: usize, const V: usize, const HISTORY: usize> RobustFilter<N, V, HI
         for before in VertexId::first(ids.vertices_before.into()) {
             writer.u8(ids.remapped[before].map_or(NOWHERE, u8::from))?;
         }
-        save_path::<V>(writer, ids.path.get(..self.history.len()).unwrap_or(&[]))
+        save_path::<V>(writer, self.published_path.get(..self.history.len()).unwrap_or(&[]))
     }
 
     /// Reads the last published result; stores it if `kept`. Returns the number of vertices of its map.
@@ -209,7 +209,7 @@ impl<const N: usize, const V: usize, const HISTORY: usize> RobustFilter<N, V, HI
         {
             return Err(SnapshotError::Contents);
         }
-        let path = &mut self.vertex_ids.path;
+        let path = &mut self.published_path;
         read_path::<V>(from, len, vertices, |index, vertex| {
             if kept && let Some(slot) = path.get_mut(index) {
                 *slot = vertex;

@@ -5,9 +5,9 @@ use std::path::PathBuf;
 
 use anyhow::Context;
 use clap::Args;
-use toposlam::reference::VERTICES;
-use toposlam::wire::map_digest;
-use toposlam::{FaultCounters, Map};
+use toposlam::persist::Persist;
+use toposlam::wire::{FilterSettings, map_digest};
+use toposlam::{FaultCounters, Filter, Map};
 use toposlam_cli::picture::{Drawing, draw};
 use toposlam_eval::faults::fault_lines;
 use toposlam_eval::mapping::score_path;
@@ -98,9 +98,12 @@ pub(super) struct Summary<'a, const V: usize> {
     pub(super) faults: FaultCounters,
 }
 
-impl<'a> Summary<'a, VERTICES> {
+impl<'a, const V: usize> Summary<'a, V> {
     /// Summarises an exploration.
-    pub(super) fn of(plan: &'a Plan, exploration: &'a Exploration<'_>) -> Self {
+    pub(super) fn of<F>(plan: &'a Plan, exploration: &'a Exploration<'_, V, F>) -> Self
+    where
+        F: Filter<V, Config: FilterSettings> + Persist,
+    {
         Self {
             plan,
             truth: exploration.rover().true_map(),

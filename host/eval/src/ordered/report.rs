@@ -5,7 +5,7 @@ use crate::walk::{PathRng, observe};
 use rand::RngExt;
 use rand_distr::{Distribution, StandardNormal};
 use std::f64::consts::TAU;
-use toposlam::{OrderedObservation, WaysSeen};
+use toposlam::{Exit, Observation, Ways};
 
 /// Bearings are at least this far from the way that the robot came by, in radians.
 const LEAST_RAD: f64 = 0.03;
@@ -40,12 +40,12 @@ impl WayHints {
         walk: &[usize],
         rng: &mut PathRng,
         hint_rng: &mut PathRng,
-    ) -> Vec<OrderedObservation> {
+    ) -> Vec<Observation> {
         let mut exit_before = None;
         let mut reports = Vec::with_capacity(walk.len());
         for (step, &at) in walk.iter().enumerate() {
             let place = building.place(at);
-            let mut report = OrderedObservation::new(observe(&building.environment().places()[place], rng));
+            let mut report = Observation::new(observe(&building.environment().places()[place], rng));
             report.starts_sequence = step == 0;
             report.exit = exit_before;
             let travel: f64 = StandardNormal.sample(hint_rng);
@@ -69,12 +69,14 @@ impl WayHints {
                 last
             };
             let bearings_mrad: Vec<u16> = seen.iter().map(ascending).collect();
-            report.ways = WaysSeen::from_bearings_mrad(&bearings_mrad).unwrap_or_default();
+            report.ways = Ways::from_bearings_mrad(&bearings_mrad).ok();
             let (wrong, missing): (f64, f64) = (hint_rng.random(), hint_rng.random());
             exit_before = exit.filter(|_| missing >= self.missing).map(|exit| {
                 let slot = seen.iter().position(|&(_, way)| way == exit).map_or(0, |slot| slot as i64 + 1);
                 let off = if wrong < self.wrong / 2.0 { -1 } else { i64::from(wrong < self.wrong) };
-                (slot + off).rem_euclid(seen.len() as i64 + 1) as u8
+                let reported = (slot + off).rem_euclid(seen.len() as i64 + 1) as usize;
+                let other = reported.checked_sub(1).and_then(|other| bearings_mrad.get(other));
+                other.and_then(|&bearing| Exit::from_bearing_mrad(bearing).ok()).unwrap_or(Exit::Back)
             });
             reports.push(report);
         }
@@ -91,7 +93,7 @@ mod tests {
         walk::path_rng,
     };
 
-    fn drawn(hints: WayHints) -> (Building, Vec<usize>, Vec<OrderedObservation>) {
+    fn drawn(hints: WayHints) -> (Building, Vec<usize>, Vec<Observation>) {
         let family: Family = "2,1,10,10,2.6,5,0.03,general".parse().unwrap();
         let building = Building::of_family(&family, 0, Bearings::Spread(0.5), true).unwrap();
         let mut rng = path_rng(1, 0);
@@ -108,9 +110,11 @@ mod tests {
             let exit = building.partner(pair[1]);
             let ways = building.ways(building.place(exit));
             let slot = |dart| ways.iter().position(|&way| way == dart).unwrap();
-            let expected = (slot(exit) + ways.len() - slot(pair[0])) % ways.len();
-            assert_eq!(reports[step + 1].exit, Some(expected as u8));
-            assert_eq!(usize::from(reports[step].ways.count()), ways.len());
+            let position = (slot(exit) + ways.len() - slot(pair[0])) % ways.len();
+            let others = reports[step].ways.unwrap();
+            let bearing = position.checked_sub(1).map(|other| others.others().unwrap()[other]);
+            assert_eq!(reports[step + 1].exit, Some(bearing.map_or(Exit::Back, Exit::Bearing)));
+            assert_eq!(usize::from(reports[step].ways.unwrap().count()), ways.len());
             assert_eq!(reports[step + 1].travel_frames, Some(building.frames(exit).round() as u16));
         }
     }
@@ -127,7 +131,7 @@ mod tests {
         let wrong = reports.iter().zip(&right).filter(|(report, right)| report.exit != right.exit).count();
         assert!((share(wrong, reports.len()) - 0.04).abs() < 0.02, "{wrong}");
         let ways: usize = walk.iter().map(|&at| building.ways(building.place(at)).len() - 1).sum();
-        let seen: usize = reports.iter().map(|report| usize::from(report.ways.count()) - 1).sum();
+        let seen: usize = reports.iter().map(|report| usize::from(report.ways.unwrap().count()) - 1).sum();
         // A way by which the robot leaves is always seen.
         assert!((0.02..0.05).contains(&share(ways - seen, ways)), "{}", share(ways - seen, ways));
     }

@@ -3,8 +3,7 @@
 //! The path of a hypothesis is a walk, so it bounds the distance of each n-gram from above. The n-grams are evaluated in the
 //! order of their bounds, until a bound is no larger than the distance found.
 
-use super::history::ObservationHistory;
-use crate::filter::WorstNgram;
+use super::WorstNgram;
 use crate::map::PerVertex;
 use crate::map::{Map, VertexId};
 use crate::place::Fingerprint;
@@ -16,19 +15,21 @@ pub(crate) const LENGTH: usize = 5;
 const EVALUATIONS: usize = 32;
 
 /// One half of **Eq. 2**: the maximum over the n-grams of the history of the minimum over the walks of the map of Eq. 3. U-turns
-/// in the history add nothing, since the map has the U-turns of its walks too. `path` is the vertex of each observation.
-/// Cost: O(T), and at most 32 times O(n · V · degree).
+/// in the history add nothing, since the map has the U-turns of its walks too. `place` gives for each of `len` observations, `T` at
+/// most, its label in steps, whether it starts a sequence, and its vertex. Cost: at most 32 times O(T) + O(n · V · degree).
 pub(crate) fn worst_ngram<const V: usize, const T: usize>(
-    history: &ObservationHistory<T>,
+    len: usize,
     map: &Map<V>,
-    path: &[VertexId],
+    place: impl Fn(usize) -> Option<(u16, bool, Option<VertexId>)>,
 ) -> WorstNgram {
     // The bound of each n-gram by its newest label: first of that label alone.
     let mut bounds = [0_u16; T];
-    for ((observation, &vertex), bound) in history.iter().zip(path).zip(&mut bounds) {
-        *bound = map.label(vertex).map_or(0, |label| observation.steps.abs_diff(label.steps()));
+    for (index, bound) in bounds.iter_mut().enumerate().take(len) {
+        let Some((steps, _, vertex)) = place(index) else { break };
+        let label = vertex.and_then(|vertex| map.label(vertex));
+        *bound = label.map_or(u16::MAX, |label| steps.abs_diff(label.steps()));
     }
-    for end in (LENGTH - 1..history.len()).rev() {
+    for end in (LENGTH - 1..len).rev() {
         let largest = bounds.get(end + 1 - LENGTH..=end).and_then(|bounds| bounds.iter().max()).copied();
         if let (Some(bound), Some(largest)) = (bounds.get_mut(end), largest) {
             *bound = largest;
@@ -42,8 +43,9 @@ pub(crate) fn worst_ngram<const V: usize, const T: usize>(
         // The next n-gram by bound; of equal bounds the older one.
         let mut next: Option<(u16, usize)> = None;
         let mut labels = 0;
-        for (end, (observation, &bound)) in history.iter().zip(&bounds).enumerate() {
-            labels = if observation.starts_sequence() { 1 } else { labels + 1 };
+        for (end, &bound) in bounds.iter().enumerate().take(len) {
+            let starts = place(end).is_none_or(|(_, starts, _)| starts);
+            labels = if starts { 1 } else { labels + 1 };
             let is_next = bound < ceiling || bound == ceiling && end > after;
             if labels >= LENGTH && is_next && next.is_none_or(|(largest, _)| bound > largest) {
                 next = Some((bound, end));
@@ -51,15 +53,13 @@ pub(crate) fn worst_ngram<const V: usize, const T: usize>(
         }
         let Some((bound, end)) = next.filter(|&(bound, _)| found.is_none_or(|found| bound > found)) else { break };
         (ceiling, after) = (bound, end);
-        let labels = core::array::from_fn(|index| {
-            history.get(end + 1 + index - LENGTH).map_or(0, |observation| observation.steps)
-        });
+        let labels = core::array::from_fn(|index| place(end + 1 + index - LENGTH).map_or(0, |(steps, ..)| steps));
         let (distance, walk) = nearest_walk(map, &labels);
         if found.is_none_or(|found| distance > found) {
             found = Some(distance);
             worst.distance_mm = distance.saturating_mul(Fingerprint::STEP_MM);
             worst.length = LENGTH as u8;
-            worst.newest_age = (history.len() - 1 - end) as u16;
+            worst.newest_age = (len - 1 - end) as u16;
             worst.vertices.iter_mut().zip(walk).for_each(|(to, vertex)| *to = vertex);
         }
     }
