@@ -28,7 +28,7 @@ use toposlam::{FaultCounters, FaultKind, Filter};
 
 use crate::Step;
 use crate::injector::{FaultRates, LineInjector, RingInjector};
-use crate::world::{BodyModel, GroundTruth, Plan, RobotModel, Rover, VoronoiError};
+use crate::world::{BodyModel, GroundTruth, Plan, RobotModel, Rover, Told, VoronoiError};
 
 /// Duration of a ring frame on the simulated board, in milliseconds.
 const FRAME_MS: u32 = 100;
@@ -168,6 +168,7 @@ where
     pub fn map(&mut self, frame: &RingFrame<S>) -> Seen {
         self.board.now_ms = self.board.now_ms.wrapping_add(FRAME_MS);
         self.frames += 1;
+        let passage = self.robot.drive().passage();
         let seen = self.robot.turn(frame, &self.ring_faults, &mut self.board);
         self.frames_not_taken += u32::from(self.robot.is_paused());
         if let Some((place, update)) = &seen {
@@ -175,7 +176,8 @@ where
             self.note(&Place { frame_index, ..*place });
             let map = self.robot.mapper().map();
             let (vertices, edges) = (map.vertices().len() as u8, map.edges().count());
-            self.steps.push(Step { place: *place, update: *update, vertices, edges });
+            let ways = passage.ways(&place.ways, self.robot.mapper().detector().rotation_mrad());
+            self.steps.push(Step { place: *place, told: Told { passage, ways }, update: *update, vertices, edges });
         }
         seen
     }
