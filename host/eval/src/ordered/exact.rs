@@ -46,7 +46,10 @@ fn majority<K: Ord>(pairs: impl Iterator<Item = (K, usize)>) -> BTreeMap<K, usiz
 }
 
 /// A building as a map, and a walk as a path on it; `None` when the map has no room.
-pub fn truth<const V: usize, const D: usize>(building: &Building, walk: &[usize]) -> Option<(DartMap<V, D>, Vec<Option<DartId>>)> {
+pub fn truth<const V: usize, const D: usize>(
+    building: &Building,
+    walk: &[usize],
+) -> Option<(DartMap<V, D>, Vec<Option<DartId>>)> {
     let mut map = DartMap::EMPTY;
     let mut number = vec![0; building.darts()];
     for place in 0..building.environment().places().len() {
