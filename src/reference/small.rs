@@ -8,13 +8,13 @@ use crate::robot::{Robot, RobotConfig};
 /// The number of sensors in the ring.
 pub const SONARS: usize = 8;
 /// The most hypotheses.
-pub const HYPOTHESES: usize = 3;
+pub const HYPOTHESES: usize = 4;
 /// The most vertices of a map.
 pub const VERTICES: usize = 16;
 /// The most ways of all vertices of a map.
-pub const WAYS: usize = 44;
+pub const WAYS: usize = 52;
 /// The most observations in the history.
-pub const HISTORY: usize = 64;
+pub const HISTORY: usize = 100;
 
 /// Eight sensors 45° apart, counter-clockwise from straight ahead.
 pub const RING: RingGeometry<SONARS> = RingGeometry::even();
