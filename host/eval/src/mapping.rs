@@ -21,7 +21,8 @@
 //! ```
 
 use toposlam::place::Place;
-use toposlam::reference::{self, VERTICES, paper};
+use toposlam::reference::robust::{self, VERTICES};
+use toposlam::reference::{self, paper};
 use toposlam::ring::{RingFrame, RingGeometry};
 use toposlam::{ConfigError, FaultCounters, Filter, Map, Mapper, MapperConfig, Passage, Update};
 
@@ -54,7 +55,7 @@ trait Stages<const SONARS: usize> {
 }
 
 /// The stages with the robust filter.
-struct Robust<const SONARS: usize>(Box<Mapper<SONARS, VERTICES, reference::Filter>>);
+struct Robust<const SONARS: usize>(Box<Mapper<SONARS, VERTICES, robust::Filter>>);
 
 impl<const SONARS: usize> Stages<SONARS> for Robust<SONARS> {
     fn observe(&mut self, frame: &RingFrame<SONARS>, passage: Passage) -> Option<(Place, Update)> {
@@ -130,7 +131,7 @@ impl Mapping<SONARS_MAX> {
 impl<const SONARS: usize> Mapping<SONARS> {
     fn start(geometry: RingGeometry<SONARS>, filter: FilterChoice) -> Result<Self, ConfigError> {
         let stages: Box<dyn Stages<SONARS>> = match filter {
-            FilterChoice::Robust => Box::new(Robust(started(geometry, reference::FILTER)?)),
+            FilterChoice::Robust => Box::new(Robust(started(geometry, robust::FILTER)?)),
             FilterChoice::Paper => Box::new(Paper(started(geometry, paper::FILTER)?, Ancestry::new())),
         };
         Ok(Self { stages, steps: Vec::new() })

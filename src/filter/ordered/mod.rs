@@ -224,6 +224,13 @@ impl<const N: usize, const V: usize, const D: usize, const T: usize> OrderedFilt
         self.publish();
         Some(self.draft.score())
     }
+
+    /// Publishes the result of refinement steps; for evaluations.
+    #[doc(hidden)]
+    #[cfg(feature = "_test")]
+    pub fn refresh(&mut self) {
+        self.publish();
+    }
 }
 
 /// Vertices keep their ids from update to update as long as most of their visits stay together.

@@ -14,7 +14,7 @@ use clap::{Args, ValueEnum};
 use toposlam::Filter;
 use toposlam::drive::VelocityCommand;
 use toposlam::persist::Persist;
-use toposlam::reference::{SONARS, paper, robust};
+use toposlam::reference::{SONARS, ordered, paper, robust};
 use toposlam::robot::RobotConfig;
 use toposlam::wire::{Belief, Evidence, FilterSettings, Location, Message, Worst};
 use toposlam_cli::emulator::Emulation;
@@ -31,7 +31,7 @@ use super::received::Received;
 /// Directory of the images built by `cargo firmware`.
 const IMAGES: &str = "thumbv7em-none-eabihf/firmware";
 /// The filter of the reference robot, whose image is `robot`.
-const REFERENCE: FilterArgument = FilterArgument::Robust;
+const REFERENCE: FilterArgument = FilterArgument::Ordered;
 
 /// Arguments of `toposlam emulate`.
 #[derive(Args)]
@@ -90,9 +90,15 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
         return hardship::run(&arguments.drive, emulation(arguments, "robot")?, arguments.places, rates);
     }
     match arguments.filter {
-        FilterArgument::Robust => compare_with::<{ robust::VERTICES }, robust::Filter>(
+        FilterArgument::Ordered => compare_with::<{ ordered::VERTICES }, ordered::Filter>(
             arguments,
             emulation(arguments, "robot")?,
+            &ordered::ROBOT,
+            &mut [0; ordered::SNAPSHOT_BYTES],
+        ),
+        FilterArgument::Robust => compare_with::<{ robust::VERTICES }, robust::Filter>(
+            arguments,
+            emulation(arguments, "robot_robust")?,
             &robust::ROBOT,
             &mut [0; robust::SNAPSHOT_BYTES],
         ),
