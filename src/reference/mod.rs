@@ -18,6 +18,7 @@
 pub mod ordered;
 pub mod paper;
 pub mod robust;
+pub mod small;
 
 #[cfg(feature = "snapshot")]
 pub use ordered::SNAPSHOT_BYTES;

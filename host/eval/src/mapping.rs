@@ -28,7 +28,7 @@ use toposlam::{ConfigError, FaultCounters, Filter, Map, Mapper, MapperConfig, Pa
 
 use toposlam_sim::Step;
 use toposlam_sim::exploration::Exploration;
-use toposlam_sim::world::TrueMap;
+use toposlam_sim::world::{Told, TrueMap};
 
 use crate::ancestry::Ancestry;
 use crate::graph::Graph;
@@ -142,7 +142,8 @@ impl<const SONARS: usize> Mapping<SONARS> {
     pub fn observe(&mut self, frame: &RingFrame<SONARS>, passage: Passage) -> Option<Step> {
         let (place, update) = self.stages.observe(frame, passage)?;
         let map = self.map();
-        let step = Step { place, update, vertices: map.vertices().len() as u8, edges: map.edges().count() };
+        let told = Told { passage, ways: passage.ways(&place.ways, 0) };
+        let step = Step { place, told, update, vertices: map.vertices().len() as u8, edges: map.edges().count() };
         self.steps.push(step);
         Some(step)
     }

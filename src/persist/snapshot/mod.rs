@@ -39,8 +39,6 @@ pub const SNAPSHOT_VERSION: u16 = 2;
 
 /// The tag of the filter's section.
 pub const FILTER_SECTION: u8 = 1;
-/// The tag of the drive's section.
-pub const DRIVE_SECTION: u8 = 2;
 
 /// The first byte of the filter's section: the kind of filter.
 pub(crate) const ROBUST: u8 = 1;

@@ -70,7 +70,8 @@ impl<const V: usize> Reporter<V> {
             location: None,
             belief: None,
             complete: false,
-            exploration: None,
+            // `None` is not all zero, so a `static` robot would not be in `.bss`.
+            exploration: Some(Exploration { frontiers: 0, complete: false }),
             faults: [0; FaultKind::ALL.len()],
             turn: 0,
             fault_turn: 0,
