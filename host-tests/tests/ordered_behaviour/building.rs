@@ -1,4 +1,5 @@
 //! Small buildings whose corridors have an order, and robots that walk through them.
+#![allow(unreachable_pub, reason = "the modules of this test share it")]
 
 use crate::split_mix::Random;
 use toposlam::{DartMap, Exit, Filter, Fingerprint, Map, Observation, OrderedFilter, Ways};

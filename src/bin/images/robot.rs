@@ -1,10 +1,14 @@
-//! The robot image (`src/bin/robot/main.rs`). On a host it is a program that names its board and fails, so that
-//! `cargo build --all-features` works there.
+//! The robot image with the filter of the reference robot (`src/bin/robot/main.rs`). On a host it is a program that names its board and fails, so
+//! that `cargo build --all-features` works there.
 #![cfg_attr(target_os = "none", no_std, no_main)]
 
 #[cfg(target_os = "none")]
 #[path = "../robot/main.rs"]
 mod image;
+
+/// The robot of the image.
+#[cfg(target_os = "none")]
+use toposlam::reference as robot;
 
 #[cfg(not(target_os = "none"))]
 fn main() -> std::process::ExitCode {

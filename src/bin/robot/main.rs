@@ -36,11 +36,13 @@ use toposlam::{
     FaultCounters,
     drive::{DifferentialDrive, VelocityCommand, WheelsConfig},
     persist::store::{BootPolicy, Store},
-    reference::{ROBOT, ReferenceRobot, SNAPSHOT_BYTES, SONARS, STORE},
+    reference::{SONARS, STORE},
     ring::drivers::{Sc18im700, SonarRing, Srf08Config, Srf08Ring},
     robot::{Board, SaveError},
     wire::{QueueFull, ResetCause},
 };
+
+use super::robot::{ROBOT, ReferenceRobot, SNAPSHOT_BYTES};
 
 const BRIDGE_BAUD_AT_RESET: u32 = 9600;
 const BAUD: u32 = 115_200;

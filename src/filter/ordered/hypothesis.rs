@@ -13,7 +13,7 @@ const FAR: f32 = 5.0;
 pub(super) const LN_OFF_MAP: f32 = -20.0;
 
 /// In a path: a place that is not on the map.
-pub(super) const OFF_MAP: u8 = 254;
+pub(crate) const OFF_MAP: u8 = 254;
 
 /// As an exit: a way that no visit has shown.
 pub(super) const UNSEEN: u8 = 253;
@@ -83,18 +83,18 @@ impl Gain {
 }
 
 #[derive(Clone, Debug)]
-pub(super) struct Hypothesis<const V: usize, const D: usize, const T: usize> {
-    pub(super) map: DartMap<V, D>,
-    pub(super) labels: [Label; V],
+pub(crate) struct Hypothesis<const V: usize, const D: usize, const T: usize> {
+    pub(crate) map: DartMap<V, D>,
+    pub(crate) labels: [Label; V],
     /// The way by which the robot came to the newest place; [`NONE`] before the first.
-    pub(super) at: u8,
-    pub(super) label_evidence: f32,
+    pub(crate) at: u8,
+    pub(crate) label_evidence: f32,
     /// All evidence but that of the labels.
-    pub(super) rest: f32,
+    pub(crate) rest: f32,
     /// A hash of the edges.
-    pub(super) map_key: u32,
+    pub(crate) map_key: u32,
     /// The way by which the robot came to each place of the record.
-    pub(super) path: [u8; T],
+    pub(crate) path: [u8; T],
 }
 
 impl<const V: usize, const D: usize, const T: usize> Hypothesis<V, D, T> {
@@ -109,7 +109,7 @@ impl<const V: usize, const D: usize, const T: usize> Hypothesis<V, D, T> {
         path: [0; T],
     };
 
-    pub(super) fn clear(&mut self) {
+    pub(crate) fn clear(&mut self) {
         self.map.clear();
         self.labels.fill(Label::NONE);
         self.at = NONE;

@@ -8,16 +8,16 @@ const VISITS_MAX: u16 = 512;
 
 /// The statistics of one vertex: 12 bytes.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub(super) struct Label {
-    pub(super) mean: f32,
-    pub(super) scatter: f32,
-    pub(super) visits: u16,
+pub(crate) struct Label {
+    pub(crate) mean: f32,
+    pub(crate) scatter: f32,
+    pub(crate) visits: u16,
     /// At how many visits the ways were seen; saturates.
-    pub(super) looks: u8,
+    pub(crate) looks: u8,
 }
 
 impl Label {
-    pub(super) const NONE: Self = Self { mean: 0.0, scatter: 0.0, visits: 0, looks: 0 };
+    pub(crate) const NONE: Self = Self { mean: 0.0, scatter: 0.0, visits: 0, looks: 0 };
 
     /// The statistics of a vertex of a known map: `visits` labels with this mean and standard deviation.
     pub(super) fn known(label: Fingerprint, visits: u32, deviation_steps: f32) -> Self {

@@ -5,9 +5,10 @@ use std::path::PathBuf;
 
 use anyhow::Context;
 use clap::Args;
-use toposlam::reference::VERTICES;
-use toposlam::wire::map_digest;
-use toposlam::{FaultCounters, Map};
+use toposlam::persist::Persist;
+use toposlam::reference::SONARS;
+use toposlam::wire::{FilterSettings, map_digest};
+use toposlam::{FaultCounters, Filter, Map};
 use toposlam_cli::picture::{Drawing, draw};
 use toposlam_eval::faults::fault_lines;
 use toposlam_eval::mapping::score_path;
@@ -48,7 +49,12 @@ pub(super) fn fault_rate(text: &str) -> Result<f64, String> {
 impl DriveArguments {
     /// The floor plan, and the robot with its noise.
     pub(super) fn world(&self) -> anyhow::Result<(Plan, RobotModel)> {
-        Ok((load_plan(&self.plan)?, RobotModel::default().with_noise(self.noise)))
+        self.world_for_ring(SONARS)
+    }
+
+    /// The floor plan, and a robot with this many sonars and its noise.
+    pub(super) fn world_for_ring(&self, sonars: usize) -> anyhow::Result<(Plan, RobotModel)> {
+        Ok((load_plan(&self.plan)?, RobotModel::for_ring(sonars).with_noise(self.noise)))
     }
 
     /// The floor plan argument.
@@ -70,7 +76,7 @@ impl DriveArguments {
         let nodes: Vec<Option<usize>> = detections.iter().map(|detection| detection.node).collect();
         let score = score_path(map, path, truth, &nodes);
         let (vertices, edges) = (map.vertices().len(), map.edges().count());
-        println!("map: {vertices} vertices, {edges} edges, digest {:08x}", map_digest(map));
+        println!("map: {vertices} vertices, {edges} edges, digest {:08x}", map_digest(map, None));
         println!(
             "against the true map: exact {}, isomorphic {}, edge F1 {:.2}, located in {:.0} % of the places",
             yes_or_no(score.exact),
@@ -98,9 +104,12 @@ pub(super) struct Summary<'a, const V: usize> {
     pub(super) faults: FaultCounters,
 }
 
-impl<'a> Summary<'a, VERTICES> {
+impl<'a, const V: usize> Summary<'a, V> {
     /// Summarises an exploration.
-    pub(super) fn of(plan: &'a Plan, exploration: &'a Exploration<'_>) -> Self {
+    pub(super) fn of<F, const S: usize>(plan: &'a Plan, exploration: &'a Exploration<'_, V, F, S>) -> Self
+    where
+        F: Filter<V, Config: FilterSettings> + Persist,
+    {
         Self {
             plan,
             truth: exploration.rover().true_map(),

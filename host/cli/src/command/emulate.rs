@@ -1,4 +1,5 @@
-//! `toposlam emulate`: the exploration of `simulate`, with mapping and drive in the firmware on an emulated STM32F405.
+//! `toposlam emulate`: the exploration of `simulate`, with mapping and drive in the firmware on an emulated STM32F405, or the small
+//! robot on an emulated Cortex-M0.
 
 use std::{
     ops::ControlFlow,
@@ -9,70 +10,133 @@ use std::{
 };
 
 use anyhow::{Context, bail, ensure};
-use clap::Args;
+use clap::{Args, ValueEnum};
+use toposlam::Filter;
 use toposlam::drive::VelocityCommand;
-use toposlam::reference::SNAPSHOT_BYTES;
-use toposlam::wire::{Belief, Evidence, Location, Message, Worst};
+use toposlam::persist::Persist;
+use toposlam::reference::{SONARS, ordered, paper, robust};
+use toposlam::robot::RobotConfig;
+use toposlam::wire::{Belief, Evidence, FilterSettings, Location, Message, Worst};
 use toposlam_cli::emulator::Emulation;
 use toposlam_cli::progress::Progress;
 use toposlam_sim::exploration::Exploration;
 use toposlam_sim::injector::FaultRates;
 
+use super::emulate_small;
 use super::drive::{DriveArguments, Summary, fault_rate};
+use super::filter::FilterArgument;
 use super::hardship;
 use super::received::Received;
 
-/// Path of the image built by `cargo firmware`.
-const IMAGE: &str = "thumbv7em-none-eabihf/firmware/robot";
+/// Directory of the images built by `cargo firmware`.
+const IMAGES: &str = "thumbv7em-none-eabihf/firmware";
+/// The filter of the reference robot, whose image is `robot`.
+const REFERENCE: FilterArgument = FilterArgument::Ordered;
 
 /// Arguments of `toposlam emulate`.
 #[derive(Args)]
 pub(crate) struct Arguments {
     #[command(flatten)]
-    drive: DriveArguments,
+    pub(super) drive: DriveArguments,
     /// Stop after this many detected places.
     #[arg(long, default_value_t = 30)]
-    places: usize,
-    /// Firmware image [default: built with `cargo firmware`].
+    pub(super) places: usize,
+    /// The robot: `reference`, or `small` with a ring of eight and 16 KiB of RAM (docs/small-robot.md).
+    #[arg(long, value_enum, default_value_t = RobotArgument::Reference)]
+    robot: RobotArgument,
+    /// Filter of the firmware; each one has an image of its own.
+    #[arg(long, value_enum, default_value_t = REFERENCE)]
+    filter: FilterArgument,
+    /// Firmware image with this filter [default: built with `cargo firmware`].
     #[arg(long, value_name = "FILE")]
-    elf: Option<PathBuf>,
+    pub(super) elf: Option<PathBuf>,
     /// Emulator to run.
     #[arg(long, value_name = "PROGRAM", default_value = "qemu-system-arm")]
-    qemu: PathBuf,
+    pub(super) qemu: PathBuf,
     /// Timeout of the whole run, in seconds.
     #[arg(long, value_name = "SECONDS", default_value_t = 800)]
-    timeout_s: u64,
+    pub(super) timeout_s: u64,
     /// Fault rate of the sensor bus and the line, 0 to 1: the probability that a bus transfer fails. Every other rate is proportional to
     /// it (docs/faults.md). With faults, the map is compared with the ground truth and not with that of `simulate`.
     #[arg(long, value_name = "RATE", default_value_t = 0.0, value_parser = fault_rate)]
     faults: f64,
 }
 
+/// The robot that is emulated.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+enum RobotArgument {
+    Reference,
+    Small,
+}
+
 /// Timeout of the firmware's velocity command.
 const VELOCITY_TIMEOUT: Duration = Duration::from_secs(10);
 
 /// The same robot simulated on the host, and its velocity command after each frame.
-struct Repetition<'buffer> {
-    exploration: Exploration<'buffer>,
+struct Repetition<'buffer, const V: usize, F: Filter<V>> {
+    exploration: Exploration<'buffer, V, F>,
     velocities: Vec<VelocityCommand>,
 }
 
 pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
+    if arguments.robot == RobotArgument::Small {
+        ensure!(arguments.faults == 0.0, "faults are emulated with the reference robot only");
+        ensure!(arguments.filter == REFERENCE, "the small robot has one filter");
+        return emulate_small::run(arguments);
+    }
+    if arguments.faults > 0.0 {
+        ensure!(arguments.filter == REFERENCE, "faults are emulated with the filter of the reference robot only");
+        let rates = FaultRates::scaled(arguments.faults);
+        return hardship::run(&arguments.drive, emulation(arguments, "robot")?, arguments.places, rates);
+    }
+    match arguments.filter {
+        FilterArgument::Ordered => compare_with::<{ ordered::VERTICES }, ordered::Filter>(
+            arguments,
+            emulation(arguments, "robot")?,
+            &ordered::ROBOT,
+            &mut [0; ordered::SNAPSHOT_BYTES],
+        ),
+        FilterArgument::Robust => compare_with::<{ robust::VERTICES }, robust::Filter>(
+            arguments,
+            emulation(arguments, "robot_robust")?,
+            &robust::ROBOT,
+            &mut [0; robust::SNAPSHOT_BYTES],
+        ),
+        FilterArgument::Paper => compare_with::<{ paper::VERTICES }, paper::Filter>(
+            arguments,
+            emulation(arguments, "robot_paper")?,
+            &paper::ROBOT,
+            &mut [0; paper::SNAPSHOT_BYTES],
+        ),
+    }
+}
+
+/// The emulation of an image, which is built unless one was given.
+fn emulation(arguments: &Arguments, image: &str) -> anyhow::Result<Emulation> {
     let elf = match &arguments.elf {
         Some(elf) => elf.clone(),
-        None => build_firmware()?,
+        None => build_firmware(image)?,
     };
     let mut emulation = Emulation::new(elf);
     emulation.qemu = arguments.qemu.clone();
     emulation.timeout = Duration::from_secs(arguments.timeout_s);
-    if arguments.faults > 0.0 {
-        return hardship::run(&arguments.drive, emulation, arguments.places, FaultRates::scaled(arguments.faults));
-    }
+    Ok(emulation)
+}
+
+/// Runs the firmware, and the same robot on the host beside it; compares them message by message.
+fn compare_with<const V: usize, F>(
+    arguments: &Arguments,
+    emulation: Emulation,
+    robot: &RobotConfig<SONARS, F::Config>,
+    buffer: &mut [u8],
+) -> anyhow::Result<()>
+where
+    F: Filter<V, Config: FilterSettings + Send> + Persist + Send,
+{
     let (plan, model) = arguments.drive.world()?;
-    let mut buffer = [0; SNAPSHOT_BYTES];
     // The emulator requests frames on one thread and delivers messages on another.
     let repetition = Mutex::new(Repetition {
-        exploration: Exploration::start(&plan, model, arguments.drive.seed(), &mut buffer)?,
+        exploration: Exploration::<V, F>::with_robot(&plan, model, arguments.drive.seed(), robot, buffer)?,
         velocities: Vec::new(),
     });
     let (tell_velocity, velocities) = mpsc::channel::<VelocityCommand>();
@@ -152,7 +216,10 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
 }
 
 /// Compares the messages of the firmware with the simulation.
-fn compare(exploration: &Exploration<'_>, heard: &Received) -> anyhow::Result<()> {
+fn compare<const V: usize, F>(exploration: &Exploration<'_, V, F>, heard: &Received) -> anyhow::Result<()>
+where
+    F: Filter<V, Config: FilterSettings> + Persist,
+{
     let (steps, mapper) = (exploration.steps(), exploration.robot().mapper());
     let map = mapper.map();
     let places = steps.iter().map(|step| (step.update.place_index, step.place.fingerprint.radius_mm()));
@@ -179,11 +246,11 @@ fn compare(exploration: &Exploration<'_>, heard: &Received) -> anyhow::Result<()
     Ok(())
 }
 
-/// Builds the firmware from the working directory and returns its path.
-fn build_firmware() -> anyhow::Result<PathBuf> {
+/// Builds an image of the firmware from the working directory and returns its path.
+fn build_firmware(image: &str) -> anyhow::Result<PathBuf> {
     let cargo = std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into());
     let status = Command::new(cargo)
-        .args(["firmware", "--bin", "robot"])
+        .args(["firmware", "--bin", image])
         .status()
         .context("building the firmware with `cargo firmware`")?;
     ensure!(
@@ -191,5 +258,5 @@ fn build_firmware() -> anyhow::Result<PathBuf> {
         "`cargo firmware` failed; it needs `rustup target add thumbv7em-none-eabihf` and the project's directory"
     );
     let target = std::env::var_os("CARGO_TARGET_DIR").map_or_else(|| PathBuf::from("target"), PathBuf::from);
-    Ok(target.join(IMAGE))
+    Ok(target.join(IMAGES).join(image))
 }
