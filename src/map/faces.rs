@@ -4,24 +4,42 @@
 //! vertices, E edges and F faces, V − E + F = 2 − 2 · genus (Euler), and a map that can be drawn in the plane has genus 0.
 
 use super::darts::DartMap;
+use super::{VertexId, VertexSet};
+
+/// A set of darts by their numbers.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct DartSet([u32; 8]);
+
+impl DartSet {
+    pub(crate) const EMPTY: Self = Self([0; 8]);
+
+    pub(crate) fn contains(&self, dart: u8) -> bool {
+        self.0.get(usize::from(dart / 32)).is_some_and(|word| word >> (dart % 32) & 1 == 1)
+    }
+
+    fn insert(&mut self, dart: u8) {
+        if let Some(word) = self.0.get_mut(usize::from(dart / 32)) {
+            *word |= 1 << (dart % 32);
+        }
+    }
+}
 
 impl<const V: usize, const D: usize> DartMap<V, D> {
-    /// Whether two frontiers lie in one face: then an edge between them leaves the genus as it is. Two frontiers of parts of
-    /// the map that are not connected lie in different faces. Cost: O(D).
-    pub fn share_face(&self, a: u8, b: u8) -> bool {
-        let mut dart = a;
+    /// The darts that a walk around the face of a frontier passes. An edge between two frontiers of one face leaves the genus as it
+    /// is. Two frontiers of parts of the map that are not connected lie in different faces. Cost: O(D).
+    pub(crate) fn face_of(&self, frontier: u8) -> DartSet {
+        let mut face = DartSet::EMPTY;
+        let mut dart = frontier;
         for _ in 0..=2 * u16::from(self.darts()) {
             dart = self.next_way(dart);
-            if dart == b {
-                return true;
+            face.insert(dart);
+            if dart == frontier {
+                break;
             }
-            if dart == a {
-                return false;
-            }
-            // Along an edge the walk arrives by the partner, and goes on with the way next to it.
+            // Along an edge the walk arrives by the partner and takes the way next to it.
             dart = self.partner(dart).unwrap_or(dart);
         }
-        false
+        face
     }
 
     /// How many faces the map has; a vertex without edges has one. Cost: O(D).
@@ -48,19 +66,20 @@ impl<const V: usize, const D: usize> DartMap<V, D> {
         faces + (0..self.vertices()).filter(alone).count() as u16
     }
 
-    /// Whether edges lead from one vertex to another. Cost: O(D).
-    pub fn are_connected(&self, a: u8, b: u8) -> bool {
-        let (mut reached, mut open) = (1_u64 << (a & 63), 1_u64 << (a & 63));
-        while open != 0 && reached >> (b & 63) & 1 == 0 {
-            let vertex = open.trailing_zeros() as u8;
-            open &= open - 1;
-            for partner in self.ways(vertex).iter().filter_map(|&way| self.partner(way)) {
-                let bit = 1_u64 << (self.vertex(partner) & 63);
-                open |= bit & !reached;
-                reached |= bit;
+    /// The vertices that edges connect with one. Cost: O(D).
+    pub(crate) fn component_of(&self, vertex: u8) -> VertexSet {
+        let mut open = VertexId::new(vertex).map_or(VertexSet::EMPTY, VertexSet::from);
+        let mut reached = open;
+        while let Some(vertex) = open.pop_first() {
+            let partners = self.ways(vertex.into()).iter().filter_map(|&way| self.partner(way));
+            for next in partners.filter_map(|partner| VertexId::new(self.vertex(partner))) {
+                if !reached.contains(next) {
+                    reached.insert(next);
+                    open.insert(next);
+                }
             }
         }
-        reached >> (b & 63) & 1 == 1
+        reached
     }
 
     /// How many parts that no edge connects the map has. Cost: O(V · D).
@@ -168,11 +187,13 @@ mod tests {
                 if a == b {
                     continue;
                 }
-                let (genus, components, share) = (map.genus(), map.components(), map.share_face(a, b));
-                assert_eq!(share, map.share_face(b, a));
+                let (genus, components, share) = (map.genus(), map.components(), map.face_of(a).contains(b));
+                assert_eq!(share, map.face_of(b).contains(a));
+                let is_connected = map.component_of(map.vertex(a)).contains(VertexId::new(map.vertex(b)).unwrap());
                 map.join(a, b);
                 let lone = (0..map.vertices()).filter(|&v| map.ways(v).iter().all(|&way| map.partner(way).is_none()));
                 assert_eq!(usize::from(map.faces()), orbits(&map) + lone.count());
+                assert_eq!(is_connected, map.components() == components);
                 if map.components() < components {
                     assert!(!share);
                     assert_eq!(map.genus(), genus);

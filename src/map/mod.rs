@@ -2,7 +2,7 @@
 
 mod dart;
 pub(crate) mod darts;
-mod faces;
+pub(crate) mod faces;
 mod per_vertex;
 mod vertex;
 mod vertex_set;

@@ -5,6 +5,8 @@ use super::model::{LN_WAYS, Model, SAME_WAY};
 use super::record::{Entry, Record};
 use crate::filter::Exit;
 use crate::map::darts::{Bearing, DartMap, NONE, WAYS};
+use crate::map::faces::DartSet;
+use crate::map::{VertexId, VertexSet};
 
 /// Labels that are this many standard deviations off are not looked at.
 const FAR: f32 = 5.0;
@@ -66,6 +68,28 @@ impl ReportedExit {
             Self::NotBack(_) => model.ln_wrong_exit(1),
         };
         report - model.ln_of(ways)
+    }
+}
+
+/// What an edge from one frontier to another does to the map.
+#[derive(Clone, Copy)]
+struct Closures {
+    /// The darts in the face of the first frontier.
+    face: DartSet,
+    /// The vertices that edges connect with it.
+    connected: VertexSet,
+    /// How many frontiers the map has.
+    frontiers: u8,
+}
+
+impl Closures {
+    const NONE: Self = Self { face: DartSet::EMPTY, connected: VertexSet::EMPTY, frontiers: 0 };
+
+    /// Whether an edge to a frontier leaves the genus as it is.
+    fn keep_genus(&self, exit: u8, frontier: u8, vertex: u8) -> bool {
+        exit == UNSEEN
+            || self.face.contains(frontier)
+            || VertexId::new(vertex).is_none_or(|vertex| !self.connected.contains(vertex))
     }
 }
 
@@ -227,11 +251,13 @@ impl<const V: usize, const D: usize, const T: usize> Hypothesis<V, D, T> {
             if reported.ln(model, exit, ways.len()) < worst {
                 continue;
             }
+            let is_known = self.map.partner(exit).is_some();
+            let closures = if is_known { Closures::NONE } else { self.closures(exit) };
             let mut propose = |target| {
                 let choice = Choice { exit, target };
-                proposed(choice, self.gain(model, &entry, reported, choice));
+                proposed(choice, self.gain_with(model, &entry, reported, choice, &closures));
             };
-            if self.map.partner(exit).is_some() {
+            if is_known {
                 propose(Target::Known);
                 continue;
             }
@@ -246,6 +272,20 @@ impl<const V: usize, const D: usize, const T: usize> Hypothesis<V, D, T> {
 
     /// What a choice gains, given what the robot reported of its exit.
     pub(super) fn gain(&self, model: &Model, entry: &Entry, reported: ReportedExit, choice: Choice) -> Gain {
+        let is_closure = matches!(choice.target, Target::At(_)) && choice.exit != NONE;
+        let closures = if is_closure { self.closures(choice.exit) } else { Closures::NONE };
+        self.gain_with(model, entry, reported, choice, &closures)
+    }
+
+    /// As [`Hypothesis::gain`], with the closures of the exit.
+    fn gain_with(
+        &self,
+        model: &Model,
+        entry: &Entry,
+        reported: ReportedExit,
+        choice: Choice,
+        closures: &Closures,
+    ) -> Gain {
         let Choice { exit, target } = choice;
         let mut gain = match target {
             Target::New => self.new_arrival(model, entry),
@@ -266,17 +306,22 @@ impl<const V: usize, const D: usize, const T: usize> Hypothesis<V, D, T> {
         gain.rest += match target {
             Target::Known => model.travel(self.map.travel(exit), entry.ln_travel),
             Target::New | Target::OffMap => model.travel((0, 0), entry.ln_travel),
-            Target::At(dart) => model.travel((0, 0), entry.ln_travel) + self.closure(model, exit, dart),
+            Target::At(dart) => model.travel((0, 0), entry.ln_travel) + {
+                let vertex = self.map.vertex(dart);
+                model.closure(closures.frontiers.into(), closures.keep_genus(exit, dart, vertex))
+            },
         };
         gain
     }
 
-    /// What it gains that an edge joins two frontiers.
-    fn closure(&self, model: &Model, exit: u8, frontier: u8) -> f32 {
-        let keeps_genus = exit == UNSEEN
-            || self.map.share_face(exit, frontier)
-            || !self.map.are_connected(self.map.vertex(exit), self.map.vertex(frontier));
-        model.closure(self.map.frontiers().count(), keeps_genus)
+    /// What an edge from an exit to each frontier does to the map. Cost: O(D).
+    fn closures(&self, exit: u8) -> Closures {
+        let frontiers = self.map.frontiers().count() as u8;
+        if exit == UNSEEN {
+            return Closures { frontiers, ..Closures::NONE };
+        }
+        let connected = self.map.component_of(self.map.vertex(exit));
+        Closures { face: self.map.face_of(exit), connected, frontiers }
     }
 
     /// The key that the hypothesis would have.

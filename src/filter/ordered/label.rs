@@ -64,6 +64,6 @@ impl Label {
     }
 
     pub(super) fn evidence(&self, model: &Model) -> f32 {
-        model.labels.evidence_of_labels(self.visits, self.scatter)
+        model.evidence_of_labels(self.visits, self.scatter)
     }
 }

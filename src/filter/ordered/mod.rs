@@ -10,6 +10,7 @@ mod fold;
 mod hypothesis;
 mod label;
 mod localise;
+mod logarithm;
 mod model;
 mod noise;
 mod publish;

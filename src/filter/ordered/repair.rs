@@ -8,6 +8,7 @@
 use super::OrderedFilter;
 use super::fold::{fit, fold};
 use super::hypothesis::{ReportedExit, UNSEEN};
+use super::logarithm::ln;
 use super::replay::Builder;
 use crate::filter::draws;
 use crate::map::darts::NONE;
@@ -302,5 +303,5 @@ fn uniform(random: &mut Xoshiro128PlusPlus) -> f32 {
 
 /// Noise that makes the largest of perturbed logarithms a draw.
 fn gumbel(random: &mut Xoshiro128PlusPlus) -> f32 {
-    -libm::logf(-libm::logf(uniform(random)))
+    -ln(-ln(uniform(random)))
 }

@@ -12,6 +12,25 @@ impl<const V: usize, const D: usize, const T: usize> Hypothesis<V, D, T> {
         let base = self.map.bearing(reference);
         let ways = self.map.ways(vertex);
         let mut found = [(NONE, 0); WAYS - 1];
+        // Where no two ways seen have the same closest way, each is that one.
+        let mut are_different = true;
+        for (slot, bearing) in entry.others().enumerate() {
+            let mut best = (NONE, 0, SAME_WAY + 1);
+            for &way in ways {
+                let off = base.wrapping_add(bearing).wrapping_sub(self.map.bearing(way)) as i16;
+                if way != reference && off.unsigned_abs() < best.2 {
+                    best = (way, off, off.unsigned_abs());
+                }
+            }
+            are_different &= best.0 == NONE || found.iter().take(slot).all(|&(taken, _)| taken != best.0);
+            if let Some(slot) = found.get_mut(slot) {
+                *slot = (best.0, best.1);
+            }
+        }
+        if are_different {
+            return found;
+        }
+        found.fill((NONE, 0));
         for _ in ways {
             let mut best = (NONE, 0, 0, SAME_WAY + 1);
             for (slot, bearing) in entry.others().enumerate() {
