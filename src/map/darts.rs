@@ -325,8 +325,7 @@ impl<const V: usize, const D: usize> DartMap<V, D> {
             }
         }
         for ways in self.ways.iter_mut().take(self.vertices.into()) {
-            let old = *ways;
-            ways.count = 0;
+            let old = core::mem::replace(ways, VertexWays::NONE);
             let left = old.as_slice().iter().map(|&dart| renumbered(dart)).filter(|&dart| dart != NONE);
             for (slot, dart) in ways.darts.iter_mut().zip(left) {
                 *slot = dart;
