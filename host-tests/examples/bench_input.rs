@@ -34,24 +34,11 @@ fn main() {
             println!("]");
         }
         Some("hints") => {
-            println!(
-                "// What is known of these places besides: how the robot left the place before, b for back, o for on, - for"
-            );
-            println!(
-                "// unknown, and the degree that the detector told, 0 for unknown. `host-tests/examples/bench_input.rs` made"
-            );
-            println!("// this file.");
+            println!("// The hints of these places: the bearings of the ways other than the one by which the robot came, the exit from");
+            println!("// the place before, and the travel time in ring frames. `host-tests/examples/bench_input.rs` made this file.");
             println!("[");
-            for row in places(simulation).chunks(14) {
-                let hints = row.iter().map(|(place, turn)| {
-                    let turn = match turn {
-                        None => '-',
-                        Some(Exit::Back) => 'b',
-                        Some(_) => 'o',
-                    };
-                    format!("*b\"{turn}{}\"", place.degree.unwrap_or(0))
-                });
-                println!("    {},", hints.collect::<Vec<_>>().join(", "));
+            for hints in places(simulation).iter().map(|(place, exit)| hints(place, *exit)) {
+                println!("    {hints},");
             }
             println!("]");
         }
