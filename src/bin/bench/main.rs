@@ -6,6 +6,7 @@
 
 mod clock;
 mod costs;
+mod grid;
 #[path = "../shared/mod.rs"]
 mod shared;
 
@@ -15,6 +16,7 @@ use clock::Clock;
 use cortex_m_semihosting::{debug, hprintln};
 use costs::Costs;
 use defmt_rtt as _;
+use grid::Grid;
 use static_cell::ConstStaticCell;
 use toposlam::{
     Exit, FaultCounters, Filter as _, Fingerprint, Observation, Update, Ways,
@@ -130,6 +132,21 @@ fn run_long(clock: &Clock, filter: &mut Filter) {
         }
     }
     hprintln!("long_vertices: {}", filter.map().vertices().len());
+}
+
+/// Runs a walk through a large building through the filter.
+fn run_large(clock: &Clock, filter: &mut Filter, (costs, refinements): (&mut PlaceCosts, &mut RefinementCosts)) {
+    let Ok(()) = filter.start(reference::FILTER, reference::SEED) else { panic!() };
+    let mut grid = Grid::new();
+    for _ in 0..PLACES_MM.len() {
+        let observation = grid.step();
+        let (instructions, _) = clock.measure(|| filter.observe(black_box(observation)));
+        costs.push(instructions);
+        for _ in 0..SLICES {
+            let (instructions, ()) = clock.measure(|| filter.refine());
+            refinements.push(instructions);
+        }
+    }
 }
 
 /// Encodes the messages of each place, and measures that.
@@ -255,7 +272,7 @@ fn main() -> ! {
     static FILTERS: ConstStaticCell<Filters> = ConstStaticCell::new(Filters::Robot(Filter::new()));
     static DETECTOR: ConstStaticCell<Detector> = ConstStaticCell::new(Detector::new());
     static REPORTER: ConstStaticCell<Reporter<VERTICES>> = ConstStaticCell::new(Reporter::new());
-    static COSTS: ConstStaticCell<[PlaceCosts; 6]> = ConstStaticCell::new([const { PlaceCosts::new() }; 6]);
+    static COSTS: ConstStaticCell<[PlaceCosts; 7]> = ConstStaticCell::new([const { PlaceCosts::new() }; 7]);
     static REFINEMENT_COSTS: ConstStaticCell<RefinementCosts> = ConstStaticCell::new(Costs::new());
     static TURN_COSTS: ConstStaticCell<FrameCosts> = ConstStaticCell::new(Costs::new());
     static SNAPSHOT: ConstStaticCell<[u8; SNAPSHOT_BYTES]> = ConstStaticCell::new([0; SNAPSHOT_BYTES]);
@@ -265,7 +282,7 @@ fn main() -> ! {
     let Some(core) = cortex_m::Peripherals::take() else { panic!() };
     let clock = &Clock::start(core.SYST);
     let (filters, detector_costs) = (FILTERS.take(), DETECTOR_COSTS.take());
-    let [ordered_costs, turn_costs, costs, both_costs, paper_costs, report_costs] = COSTS.take();
+    let [ordered_costs, large_costs, turn_costs, costs, both_costs, paper_costs, report_costs] = COSTS.take();
     let refinements = REFINEMENT_COSTS.take();
     let mut wire = Wire { reporter: REPORTER.take(), encoder: Encoder::new(0), costs: report_costs, largest_bytes: 0 };
     let capacities = Capacities::new(VERTICES as u8, Filter::capacities(&reference::FILTER), SONARS as u8);
@@ -282,6 +299,9 @@ fn main() -> ! {
         hprintln!("ordered_vertices: {}", filter.map().vertices().len());
         let stack_bytes = shared::stack_high_water_bytes();
         hprintln!("ordered_stack_high_water_bytes: {}", stack_bytes);
+        run_large(clock, filter, (large_costs, refinements));
+        refinements.print("large_instructions_per_refinement");
+        hprintln!("large_vertices: {}", filter.map().vertices().len());
     }
     *filters = const { Filters::Robust(robust::Filter::new()) };
     if let Filters::Robust(filter) = filters {
@@ -302,6 +322,7 @@ fn main() -> ! {
     hprintln!("places: {}", PLACES_MM.len());
     hprintln!("history_places: {}", HISTORY);
     ordered_costs.print("ordered_instructions_per_place");
+    large_costs.print("large_instructions_per_place");
     turn_costs.print("robust_turn_instructions_per_place");
     costs.print("robust_instructions_per_place");
     both_costs.print("robust_both_instructions_per_place");
@@ -316,7 +337,7 @@ fn main() -> ! {
     }
     turn_frames.print("turn_instructions_per_frame");
     hprintln!("robot_bytes: {}", size_of::<ReferenceRobot<'_>>());
-    hprintln!("drive_bytes: {}", size_of::<Drive<VERTICES, HISTORY>>());
+    hprintln!("drive_bytes: {}", size_of::<Drive<VERTICES>>());
     hprintln!("inbox_bytes: {}", size_of::<Inbox>());
     hprintln!("frames: {}", FRAMES_MM.len());
     hprintln!("frames_places_detected: {}", places_detected);

@@ -22,8 +22,8 @@ use toposlam_cli::progress::Progress;
 use toposlam_sim::exploration::Exploration;
 use toposlam_sim::injector::FaultRates;
 
-use super::emulate_small;
 use super::drive::{DriveArguments, Summary, fault_rate};
+use super::emulate_small;
 use super::filter::FilterArgument;
 use super::hardship;
 use super::received::Received;

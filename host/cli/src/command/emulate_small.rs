@@ -53,10 +53,7 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<()> {
         let velocity = board.velocity;
         for expected in lines.host(&board.sent)? {
             let message = lines.firmware(&mut machine)?;
-            ensure!(
-                is_same(&message, &expected),
-                "the firmware sent {message:?}, but the simulation {expected:?}"
-            );
+            ensure!(is_same(&message, &expected), "the firmware sent {message:?}, but the simulation {expected:?}");
             messages += 1;
         }
         exploration.drive(velocity);
