@@ -172,7 +172,7 @@ impl Layout {
         &self.points[..self.vertices]
     }
 
-    /// The drawing of every edge, parallel edges and loops included.
+    /// The drawing of every edge, in the order of [`TopologicalMap::all_edges`].
     pub fn edges(&self) -> Vec<EdgeLine> {
         let line = |path: &network::Path| {
             let points = path.nodes.iter().map(|&node| self.points[node]).collect();

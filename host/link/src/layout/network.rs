@@ -33,15 +33,10 @@ impl Network {
     /// drawn in the plane with it and the whole map is known.
     pub(super) fn of(map: &TopologicalMap) -> Self {
         let mut network = Self::default();
-        for edge in map.way_edges() {
-            let [from, to] = edge.ends;
-            network.add(map.vertices.len(), [from.vertex, to.vertex], Some(edge.ends));
-        }
-        let is_whole = map.edges.iter().all(|&(a, b)| network.has_edge(a, b));
-        for &(a, b) in &map.edges {
-            if !network.has_edge(a, b) {
-                network.add(map.vertices.len(), [a, b], None);
-            }
+        let edges = map.all_edges();
+        let is_whole = edges.iter().all(|(_, edge)| edge.is_some());
+        for (ends, edge) in edges {
+            network.add(map.vertices.len(), ends, edge.map(|edge| edge.ends));
         }
         let nodes = map.vertices.len() + network.bends.len();
         let mut graph = Graph::new(nodes);
@@ -56,10 +51,6 @@ impl Network {
             }
         }
         network
-    }
-
-    fn has_edge(&self, a: u8, b: u8) -> bool {
-        self.paths.iter().any(|path| path.ends == [a, b] || path.ends == [b, a])
     }
 
     fn add(&mut self, vertices: usize, ends: [u8; 2], ways: Option<[WayId; 2]>) {
