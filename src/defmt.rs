@@ -101,9 +101,9 @@ impl Format for Echo {
 
 impl Format for Place {
     fn format(&self, f: Formatter<'_>) {
-        let Self { fingerprint, frame_index, degree, spread_mm } = self;
+        let Self { fingerprint, frame_index, degree, ways, spread_mm } = self;
         write!(f, "place of {} in frame {=u32}, degree {}", fingerprint, frame_index, degree);
-        write!(f, ", spread {=u16} mm", spread_mm);
+        write!(f, ", ways at {} mrad, spread {=u16} mm", ways.bearings_mrad(), spread_mm);
     }
 }
 

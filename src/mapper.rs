@@ -2,7 +2,7 @@
 
 use crate::config_error::ConfigError;
 use crate::fault::FaultCounters;
-use crate::filter::{Filter, Observation, OrderedConfig, Passage, RobustConfig, Update, Ways};
+use crate::filter::{Filter, Observation, OrderedConfig, Passage, RobustConfig, Update};
 use crate::map::Map;
 use crate::place::{Place, PlaceConfig, PlaceDetector};
 use crate::ring::{RingFrame, RingGeometry};
@@ -116,12 +116,12 @@ impl<const SONARS: usize, const V: usize, F: Filter<V>> Mapper<SONARS, V, F> {
     #[inline(never)]
     pub fn observe(&mut self, frame: &RingFrame<SONARS>, passage: Passage) -> Option<(Place, Update)> {
         if let Some(place) = self.detector.observe(frame) {
-            let Place { fingerprint, degree, .. } = place;
             let starts_sequence = core::mem::take(&mut self.starts_sequence);
             self.refinement_steps = 0;
             let Passage { exit, travel_frames, .. } = passage;
-            let ways = degree.and_then(|degree| Ways::from_count(degree).ok());
-            let observation = Observation { fingerprint, ways, exit, travel_frames, starts_sequence };
+            let ways = passage.ways(&place.ways, self.detector.rotation_mrad());
+            let observation =
+                Observation { fingerprint: place.fingerprint, ways, exit, travel_frames, starts_sequence };
             return Some((place, self.filter.observe(observation)));
         }
         let most = if self.filter.is_in_doubt() { REFINEMENT_STEPS_IN_DOUBT } else { REFINEMENT_STEPS };

@@ -1,14 +1,14 @@
 //! Drives from one place to the next: along an edge, to the meet point, and out by the chosen exit.
 
-use super::rotation::RotationEstimate;
 use super::voronoi::{Sector, edge_heading_mrad, meet_point_offset_mm};
 use super::{DriveConfig, VelocityCommand};
-use crate::bearing::{HALF_TURN_MRAD, rotated, turn_mrad};
+use crate::bearing::{HALF_TURN_MRAD, counter_clockwise_mrad, rotated, turn_mrad};
 use crate::config_error::ConfigError;
 use crate::fault::{FaultCounters, FaultKind};
-use crate::filter::Exit;
+use crate::filter::{Exit, Passage};
 use crate::place::{Obstacle, Obstacles, Openings, RingScan};
 use crate::ring::Echo;
+use crate::top_k::TopK;
 
 /// An opening is matched to the one of the frame before when its bearing changed by at most this, in milliradians.
 const SAME_OPENING_MRAD: u16 = 700;
@@ -54,22 +54,25 @@ pub enum DriveState {
     Recover = 6,
 }
 
-/// The exits of the place where the robot stands, numbered counter-clockwise.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) struct Exits {
-    /// How many there are, at least 1.
-    pub(super) count: u8,
-    /// Whether exit 0 is known to be the one by which the robot entered.
-    pub(super) is_entry_first: bool,
+/// The exits of the place where the robot stands: their bearings relative to the way by which it entered, in milliradians
+/// counter-clockwise, 0 to 6282, ascending.
+pub(super) type Exits = TopK<u16, { Obstacles::MAX }>;
+
+/// The largest bearing relative to another, in milliradians.
+const MAX_RELATIVE_MRAD: i32 = 6282;
+
+/// How the robot left the place that was reported last. It is all zero while unknown, so a `static` robot lies in `.bss`.
+#[derive(Clone, Copy, Debug)]
+struct Departure {
+    is_known: bool,
+    /// The bearing of the exit relative to the way by which the robot entered.
+    exit_mrad: u16,
+    /// The sum of the speeds of all frames since then, in thousandths of full speed.
+    driven_permille: u32,
 }
 
-/// How the robot left the place that was reported last. `Option<Exit>` is not all zero, so a `static` robot would not be in
-/// `.bss`.
-#[derive(Clone, Copy, Debug)]
-enum Left {
-    Unknown,
-    Back,
-    On,
+impl Departure {
+    const UNKNOWN: Self = Self { is_known: false, exit_mrad: 0, driven_permille: 0 };
 }
 
 /// A state machine with one step for each ring frame. Memory: some 60 bytes.
@@ -83,10 +86,11 @@ pub(super) struct LocalPlanner {
     entry_mrad: i16,
     /// Bearing of the chosen exit, or of the direction to recover to.
     target_mrad: i16,
-    rotation: RotationEstimate,
+    /// Change of all bearings since the frame before.
+    rotation_mrad: i32,
     /// The degree of the place by the detector.
     degree: Option<u8>,
-    left: Left,
+    departure: Departure,
     faults: FaultCounters,
 }
 
@@ -98,9 +102,9 @@ impl LocalPlanner {
             frames: 0,
             entry_mrad: 0,
             target_mrad: 0,
-            rotation: RotationEstimate::new(),
+            rotation_mrad: 0,
             degree: None,
-            left: Left::Unknown,
+            departure: Departure::UNKNOWN,
             faults: FaultCounters::new(),
         }
     }
@@ -129,12 +133,16 @@ impl LocalPlanner {
         }
     }
 
-    pub(super) const fn exit(&self) -> Option<Exit> {
-        match self.left {
-            Left::Unknown => None,
-            Left::Back => Some(Exit::Back),
-            Left::On => Some(Exit::On),
+    /// What is known of the way from the place that was reported last.
+    pub(super) fn passage(&self) -> Passage {
+        let entry_mrad = (self.state == DriveState::Approach).then_some(self.entry_mrad);
+        let Departure { is_known, exit_mrad, driven_permille } = self.departure;
+        if !is_known {
+            return Passage { entry_mrad, ..Passage::UNKNOWN };
         }
+        let frames = driven_permille.saturating_add(500) / 1000;
+        let travel_frames = Some(frames.clamp(1, u16::MAX.into()) as u16);
+        Passage { exit: Exit::from_bearing_mrad(exit_mrad).ok(), travel_frames, entry_mrad }
     }
 
     pub(super) const fn faults(&self) -> &FaultCounters {
@@ -143,8 +151,11 @@ impl LocalPlanner {
 
     /// The detector has reported a place of this degree.
     pub(super) fn arrive(&mut self, degree: Option<u8>) {
+        if self.state != DriveState::Approach {
+            self.entry_mrad = HALF_TURN_MRAD;
+        }
         self.degree = degree;
-        self.left = Left::Unknown;
+        self.departure = Departure::UNKNOWN;
         self.enter(DriveState::ChooseExit);
     }
 
@@ -157,22 +168,23 @@ impl LocalPlanner {
 
     /// Discards what is known of the present place and edge.
     pub(super) fn forget_edge(&mut self) {
-        self.left = Left::Unknown;
+        self.departure = Departure::UNKNOWN;
         self.enter(DriveState::FollowEdge);
     }
 
-    /// Processes the next frame. `is_at_place` is [`PlaceDetector::is_at_place`](crate::place::PlaceDetector::is_at_place);
-    /// `choose` returns the number of the exit to take, `None` to stop.
+    /// Processes the next frame. `rotation_mrad` and `is_at_place` are those of the
+    /// [`PlaceDetector`](crate::place::PlaceDetector); `choose` returns the bearing of the exit to take, `None` to stop.
     pub(super) fn advance<const SONARS: usize>(
         &mut self,
         scan: &RingScan<'_, SONARS>,
+        rotation_mrad: i32,
         is_at_place: bool,
-        choose: impl FnOnce(Exits) -> Option<u8>,
+        choose: impl FnOnce(&Exits) -> Option<u16>,
     ) -> VelocityCommand {
         self.frames = self.frames.saturating_add(1);
+        self.rotation_mrad = rotation_mrad;
         let obstacles = scan.obstacles();
-        self.rotation.update(&obstacles);
-        match self.state {
+        let velocity = match self.state {
             DriveState::FollowEdge => self.follow_edge(scan, &obstacles, is_at_place),
             DriveState::Approach => self.approach(scan, &obstacles),
             DriveState::ChooseExit => self.choose_exit(scan, &obstacles, choose),
@@ -180,7 +192,10 @@ impl LocalPlanner {
             DriveState::Depart => self.depart(scan, &obstacles, is_at_place),
             DriveState::Recover => self.recover(scan),
             DriveState::Stopped => VelocityCommand::STOP,
-        }
+        };
+        self.departure.driven_permille =
+            self.departure.driven_permille.saturating_add(velocity.speed_permille.into());
+        velocity
     }
 
     fn enter(&mut self, state: DriveState) {
@@ -238,12 +253,11 @@ impl LocalPlanner {
         &mut self,
         scan: &RingScan<'_, SONARS>,
         obstacles: &Obstacles,
-        choose: impl FnOnce(Exits) -> Option<u8>,
+        choose: impl FnOnce(&Exits) -> Option<u16>,
     ) -> VelocityCommand {
         let openings = scan.openings(obstacles);
         self.track_entry(&openings);
-        let bearings_mrad = openings.bearings_mrad();
-        let count = bearings_mrad.len();
+        let count = openings.bearings_mrad().len();
         let agrees = self.degree.is_none_or(|degree| usize::from(degree) == count);
         if count == 0 && self.frames > CHOOSE_FRAMES {
             return self.give_up(scan);
@@ -251,18 +265,17 @@ impl LocalPlanner {
         if count == 0 || !agrees && self.frames <= CHOOSE_FRAMES {
             return VelocityCommand::STOP;
         }
-        let entry = openings.nearest(self.entry_mrad, SAME_OPENING_MRAD).map(|(index, _)| index);
-        let Some(exit) = choose(Exits { count: count as u8, is_entry_first: entry.is_some() }) else {
+        let mut exits = Exits::new(0);
+        for &opening_mrad in openings.bearings_mrad() {
+            let relative_mrad = counter_clockwise_mrad(self.entry_mrad, opening_mrad).min(MAX_RELATIVE_MRAD);
+            exits.insert(relative_mrad as u16, |one, other| one <= other);
+        }
+        let Some(exit_mrad) = choose(&exits) else {
             self.enter(DriveState::Stopped);
             return VelocityCommand::STOP;
         };
-        self.left = match entry {
-            None => Left::Unknown,
-            Some(_) if exit == 0 => Left::Back,
-            Some(_) => Left::On,
-        };
-        let index = (entry.unwrap_or(0) + usize::from(exit)).checked_rem(count).unwrap_or(0);
-        self.target_mrad = bearings_mrad.get(index).copied().unwrap_or(0);
+        self.departure = Departure { is_known: true, exit_mrad, driven_permille: 0 };
+        self.target_mrad = rotated(self.entry_mrad, exit_mrad.into());
         self.enter(DriveState::TurnToExit);
         self.turn_to_exit(scan, obstacles)
     }
@@ -276,7 +289,7 @@ impl LocalPlanner {
             return self.give_up(scan);
         }
         // An exit that this frame does not show is where the rotation of the ring brings it.
-        let expected_mrad = rotated(self.target_mrad, self.rotation.rotation_mrad());
+        let expected_mrad = rotated(self.target_mrad, self.rotation_mrad);
         let seen = scan.openings(obstacles).nearest(expected_mrad, SAME_OPENING_MRAD);
         let target_mrad = seen.map_or(expected_mrad, |(_, target_mrad)| target_mrad);
         // Straight behind, noise must not reverse the direction of the turn.
@@ -324,7 +337,7 @@ impl LocalPlanner {
     /// Records that the robot is lost, and turns to the longest range.
     fn give_up<const SONARS: usize>(&mut self, scan: &RingScan<'_, SONARS>) -> VelocityCommand {
         self.faults.record(FaultKind::DriveLost);
-        self.left = Left::Unknown;
+        self.departure = Departure::UNKNOWN;
         let longest = scan.echoes().max_by_key(|(echo, _)| match echo {
             Echo::Dead => 0,
             Echo::Range { range_mm } => *range_mm,
@@ -366,11 +379,11 @@ impl LocalPlanner {
         (share as u16).max(APPROACH_PERMILLE.min(full))
     }
 
-    /// Updates the bearing of the entry while the robot turns a little.
+    /// Updates the bearing of the entry. In a frame that does not show the entry it is where the rotation of the ring brings it.
     fn track_entry(&mut self, openings: &Openings) {
-        if let Some((_, entry_mrad)) = openings.nearest(self.entry_mrad, SAME_OPENING_MRAD) {
-            self.entry_mrad = entry_mrad;
-        }
+        let expected_mrad = rotated(self.entry_mrad, self.rotation_mrad);
+        let seen = openings.nearest(expected_mrad, SAME_OPENING_MRAD);
+        self.entry_mrad = seen.map_or(expected_mrad, |(_, entry_mrad)| entry_mrad);
     }
 }
 

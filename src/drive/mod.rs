@@ -3,29 +3,27 @@
 //! ```text
 //! PlaceDetector ─ RingScan ─▶ local planner ─ VelocityCommand ─▶ wheels
 //! Filter ─ best map, path ─▶ route planner ─ exit ─▶ local planner
-//!                                 ▲ turn hint, back to the filter
+//! Passage ◀── exit, travel time, way it came by ── local planner
 //! ```
 //!
 //! | Step | File |
 //! |---|---|
 //! | Heading along an edge, position of a meet point | `voronoi.rs` |
-//! | Rotation of the ring from frame to frame | `rotation.rs` |
 //! | State machine from place to place ([`DriveState`]) | `local_planner.rs` |
-//! | Which exit leads to which vertex, and how often it was used | `departures.rs` |
 //! | Choice of an exit: explore, or drive to a vertex ([`Goal`]) | `route_planner.rs` |
+//! | Travel times over the ways of the map | `routes.rs` |
 //! | Velocity command to PWM ([`DifferentialDrive`]) | `wheels.rs` |
 //!
 //! The local planner keeps the robot equidistant from the two closest obstacles. It stops where a third is equidistant,
-//! until the detector reports the place, and leaves by the exit that the route planner chooses. The exits of a place are
-//! numbered counter-clockwise from the one by which the robot entered. There is no metric position and no odometry. The
-//! route planner remembers the exits taken at the places of the history. Combined with the filter's best path, they give the
-//! exit that leads to each neighbour of a vertex, and every revision of the path revises them.
+//! until the detector reports the place, and leaves by the exit that the route planner chooses. The exits of a place are known
+//! by their bearings relative to the way by which the robot entered. There is no metric position and no odometry. The route
+//! planner matches the exits to the ways of the filter's best map by these bearings, and stores nothing of them: every revision
+//! of the map applies at once.
 
 mod config;
-mod departures;
 mod local_planner;
-mod rotation;
 mod route_planner;
+mod routes;
 mod voronoi;
 mod wheels;
 
@@ -33,9 +31,6 @@ pub use config::DriveConfig;
 pub use local_planner::DriveState;
 pub use route_planner::{Goal, GoalStatus};
 pub use wheels::{DifferentialDrive, MotorError, Wheel, WheelSpeeds, WheelsConfig};
-
-#[cfg(feature = "snapshot")]
-pub(crate) use departures::is_departure;
 
 use crate::config_error::ConfigError;
 use crate::fault::FaultCounters;
@@ -60,16 +55,20 @@ impl VelocityCommand {
     pub const STOP: Self = Self { heading_mrad: 0, speed_permille: 0 };
 }
 
-/// The motion planner of a robot whose maps have at most `V` vertices and whose filter remembers `HISTORY` places.
+/// The motion planner of a robot whose maps have at most `V` vertices.
 ///
-/// A `static` of it is in `.bss`. Memory: about `HISTORY + 160` bytes. Time for a ring frame: O(SONARS); at a place O(V · HISTORY).
+/// It explores and drives to vertices with a filter that knows the ways of its map ([`Filter::darts`]). With another filter it
+/// leaves each place by an exit at random, and no vertex can be its goal.
+///
+/// A `static` of it is in `.bss`. Memory: about 120 bytes. Time for a ring frame: O(SONARS); at a place O(V² + D) for a map of D
+/// darts.
 #[derive(Clone, Debug)]
-pub struct Drive<const V: usize, const HISTORY: usize> {
+pub struct Drive<const V: usize> {
     local_planner: LocalPlanner,
-    route_planner: RoutePlanner<V, HISTORY>,
+    route_planner: RoutePlanner<V>,
 }
 
-impl<const V: usize, const HISTORY: usize> Drive<V, HISTORY> {
+impl<const V: usize> Drive<V> {
     /// Creates a drive that is not started.
     pub const fn new() -> Self {
         Self { local_planner: LocalPlanner::new(), route_planner: RoutePlanner::new() }
@@ -106,12 +105,18 @@ impl<const V: usize, const HISTORY: usize> Drive<V, HISTORY> {
         }
         let route_planner = &mut self.route_planner;
         self.local_planner
-            .advance(&detector.scan(), detector.is_at_place(), |exits| route_planner.choose(filter, exits))
+            .advance(&detector.scan(), detector.rotation_mrad(), detector.is_at_place(), |exits| {
+                route_planner.choose(filter, exits)
+            })
     }
 
     /// How the robot drives from the place that was reported last: the hints of the next observation.
-    pub const fn passage(&self) -> Passage {
-        Passage { exit: self.local_planner.exit(), ..Passage::UNKNOWN }
+    ///
+    /// The exit and the bearing of the way by which the robot came are measured at each place. The travel time is the number of
+    /// ring frames, each weighted by the speed of its velocity command: the time of the same way at full speed, without that for
+    /// turns in place.
+    pub fn passage(&self) -> Passage {
+        self.local_planner.passage()
     }
 
     /// Sets the goal. A robot that stopped at a place chooses an exit again.
@@ -128,7 +133,16 @@ impl<const V: usize, const HISTORY: usize> Drive<V, HISTORY> {
         self.local_planner.set_speed(speed_permille)
     }
 
-    /// Whether the best map has a path from the robot's vertex to another one. Time O(V²).
+    /// Whether the map is complete: the robot knows of no way that it has not driven and could reach. It then patrols the ways
+    /// with the fewest passages, so that mistakes of the map are found.
+    ///
+    /// A way that at most a third of the visits to its vertex have shown does not count. The map must be more likely than not, and
+    /// both must hold at two successive places; three successive places with a way to drive end it.
+    pub const fn is_complete(&self) -> bool {
+        self.route_planner.is_complete()
+    }
+
+    /// Whether the best map has a path from the robot's vertex to another one. Time O(V² + D).
     pub fn leads_to(&self, filter: &impl Filter<V>, vertex: VertexId) -> bool {
         route_planner::leads_to(filter, vertex)
     }
@@ -153,22 +167,15 @@ impl<const V: usize, const HISTORY: usize> Drive<V, HISTORY> {
         self.local_planner.holds_place()
     }
 
-    /// Announces that the robot may have been moved to another place. The exit that it took last is void.
+    /// Announces that the robot may have been moved to another place. What it knows of its way is void.
     pub fn kidnapped(&mut self) {
-        self.route_planner.forget_departure();
         self.local_planner.forget_edge();
     }
 
-    /// How the robot left each place of the history, oldest first: one byte each.
+    /// Starts to explore with a restored map.
     #[cfg(feature = "snapshot")]
-    pub(crate) fn departures(&self) -> impl ExactSizeIterator<Item = u8> + '_ {
-        self.route_planner.departures()
-    }
-
-    /// Replaces the departures at the places of the history, oldest first, and explores.
-    #[cfg(feature = "snapshot")]
-    pub(crate) fn resume(&mut self, departures: impl Iterator<Item = u8>) {
-        self.route_planner.resume(departures);
+    pub(crate) fn resume(&mut self) {
+        self.route_planner.set_goal(Goal::Explore);
         self.local_planner.forget_edge();
     }
 
@@ -178,7 +185,7 @@ impl<const V: usize, const HISTORY: usize> Drive<V, HISTORY> {
     }
 }
 
-impl<const V: usize, const HISTORY: usize> Default for Drive<V, HISTORY> {
+impl<const V: usize> Default for Drive<V> {
     fn default() -> Self {
         Self::new()
     }

@@ -2,21 +2,29 @@
 
 use rand_core::Rng;
 
-use super::departures::{Departures, Exit, MAX_EXITS};
 use super::local_planner::Exits;
+use super::routes::{edge_frames, frames_to};
 use crate::filter::Filter;
 use crate::filter::draws;
-use crate::map::PerVertex;
-use crate::map::{VertexId, VertexSet};
+use crate::map::{DartId, Darts, PerVertex, VertexId};
+use crate::place::Obstacles;
 
 /// Minimum probability of a vertex that counts as reached, in units of 2⁻¹⁶.
 const REACHED_Q16: u32 = 1 << 15;
+/// Minimum probability of a map that counts as complete, in units of 2⁻¹⁶.
+const COMPLETE_Q16: u32 = 1 << 15;
+/// Successive places without a way to drive after which a map is complete.
+const COMPLETE_PLACES: u8 = 2;
+/// Successive places with a way to drive after which a map is no longer complete.
+const INCOMPLETE_PLACES: u8 = 3;
+/// An exit is matched to the way of the map whose bearing differs by at most this, in units of 2⁻¹⁶ of a turn: 0.55 rad.
+const SAME_WAY: u16 = 5736;
 
 /// What the drive is to do.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Goal {
-    /// Explore: leave every place by the exit with the fewest uses.
+    /// Explore: drive the nearest way that is new. When the map is complete, drive the ways with the fewest passages.
     Explore,
     /// Drive to this vertex of the best map and stop there.
     Vertex(VertexId),
@@ -40,9 +48,9 @@ pub enum GoalStatus {
     TimedOut,
 }
 
-/// The goal and the departures of the history. Memory: one byte for each of `HISTORY` places, and some 30 bytes.
+/// The goal, and whether the map is complete. Memory: some 30 bytes.
 #[derive(Clone, Debug)]
-pub(super) struct RoutePlanner<const V: usize, const HISTORY: usize> {
+pub(super) struct RoutePlanner<const V: usize> {
     seed: u64,
     goal: Goal,
     goal_status: GoalStatus,
@@ -50,10 +58,56 @@ pub(super) struct RoutePlanner<const V: usize, const HISTORY: usize> {
     places: u16,
     /// Number of choices since the start, the index of the random draws.
     decisions: u32,
-    departures: Departures<HISTORY>,
+    is_complete: bool,
+    /// Successive places that contradict `is_complete`.
+    contrary_places: u8,
 }
 
-impl<const V: usize, const HISTORY: usize> RoutePlanner<V, HISTORY> {
+/// The ways of the map behind the exits of the present place.
+#[derive(Clone, Copy)]
+struct Here<'a> {
+    darts: Darts<'a>,
+    exits: &'a [u16],
+    ways: [Option<DartId>; Obstacles::MAX],
+}
+
+impl<'a> Here<'a> {
+    /// Matches exits and ways that are the nearest to each other in bearing. Without `arrival` no exit has a way.
+    fn new(darts: Darts<'a>, arrival: Option<DartId>, exits: &'a Exits) -> Self {
+        let mut here = Self { darts, exits: exits.as_slice(), ways: [None; Obstacles::MAX] };
+        let Some((vertex, arrival)) =
+            arrival.and_then(|arrival| Some((darts.vertex(arrival)?, darts.bearing(arrival)?)))
+        else {
+            return here;
+        };
+        let off = |exit_mrad: u16, way: DartId| {
+            let expected = arrival.wrapping_add((u32::from(exit_mrad) * 65_536 / 6283) as u16);
+            let off = darts.bearing(way).unwrap_or(0).wrapping_sub(expected) as i16;
+            off.unsigned_abs()
+        };
+        for (&exit_mrad, slot) in here.exits.iter().zip(&mut here.ways) {
+            let nearest = darts.ways(vertex).min_by_key(|&way| off(exit_mrad, way));
+            *slot = nearest.filter(|&way| {
+                let least = here.exits.iter().map(|&other_mrad| off(other_mrad, way)).min();
+                off(exit_mrad, way) <= SAME_WAY && least == Some(off(exit_mrad, way))
+            });
+        }
+        here
+    }
+
+    fn way(&self, exit: usize) -> Option<DartId> {
+        self.ways.get(exit).copied().flatten()
+    }
+
+    /// The travel time through an exit to a target of `frames`, in ring frames.
+    fn frames<const V: usize>(&self, exit: usize, frames: &PerVertex<Option<u32>, V>) -> Option<u32> {
+        let way = self.way(exit)?;
+        let end = self.darts.vertex(self.darts.partner(way)?)?;
+        Some(edge_frames(self.darts, way).saturating_add((*frames.get(end)?)?))
+    }
+}
+
+impl<const V: usize> RoutePlanner<V> {
     pub(super) const fn new() -> Self {
         Self {
             seed: 0,
@@ -61,17 +115,13 @@ impl<const V: usize, const HISTORY: usize> RoutePlanner<V, HISTORY> {
             goal_status: GoalStatus::Inactive,
             places: 0,
             decisions: 0,
-            departures: Departures::new(),
+            is_complete: false,
+            contrary_places: 0,
         }
     }
 
     pub(super) fn start(&mut self, seed: u64) {
-        self.seed = seed;
-        self.goal = Goal::Explore;
-        self.goal_status = GoalStatus::Inactive;
-        self.places = 0;
-        self.decisions = 0;
-        self.departures.clear();
+        *self = Self { seed, ..Self::new() };
     }
 
     pub(super) fn set_goal(&mut self, goal: Goal) {
@@ -88,25 +138,12 @@ impl<const V: usize, const HISTORY: usize> RoutePlanner<V, HISTORY> {
         self.goal_status
     }
 
-    pub(super) fn forget_departure(&mut self) {
-        self.departures.forget_newest();
+    pub(super) const fn is_complete(&self) -> bool {
+        self.is_complete
     }
 
-    #[cfg(feature = "snapshot")]
-    pub(super) fn departures(&self) -> impl ExactSizeIterator<Item = u8> + '_ {
-        self.departures.iter()
-    }
-
-    /// Replaces the departures, oldest first, and explores.
-    #[cfg(feature = "snapshot")]
-    pub(super) fn resume(&mut self, departures: impl Iterator<Item = u8>) {
-        self.set_goal(Goal::Explore);
-        self.departures.replace(departures);
-    }
-
-    /// The filter has observed a place.
+    /// The filter has observed a place. Time O(V² + D).
     pub(super) fn arrive(&mut self, filter: &impl Filter<V>) {
-        self.departures.arrive();
         self.places = self.places.saturating_add(1);
         if let (Goal::Vertex(target), GoalStatus::Active) = (self.goal, self.goal_status) {
             match filter.remapped(target) {
@@ -114,28 +151,40 @@ impl<const V: usize, const HISTORY: usize> RoutePlanner<V, HISTORY> {
                 None => self.goal_status = GoalStatus::VertexRemoved,
             }
         }
+        self.update_completeness(filter);
     }
 
-    /// Chooses the exit of the present place; `None` to stop there. Time O(V² + exits · HISTORY).
-    pub(super) fn choose(&mut self, filter: &impl Filter<V>, exits: Exits) -> Option<u8> {
-        let known = self.departures.exits(filter, if exits.is_entry_first { exits.count } else { 0 });
+    fn update_completeness(&mut self, filter: &impl Filter<V>) {
+        let (Some(darts), Some(here)) = (filter.darts(), filter.recent(0)) else { return };
+        let has_frontier = frames_to_frontier(filter, darts)[here].is_some();
+        let seems_complete = !has_frontier && filter.map_probability_q16() >= COMPLETE_Q16;
+        if seems_complete == self.is_complete || self.is_complete && !has_frontier {
+            self.contrary_places = 0;
+            return;
+        }
+        self.contrary_places = self.contrary_places.saturating_add(1);
+        if self.contrary_places >= if self.is_complete { INCOMPLETE_PLACES } else { COMPLETE_PLACES } {
+            self.is_complete = !self.is_complete;
+            self.contrary_places = 0;
+        }
+    }
+
+    /// Chooses the exit of the present place; `None` to stop there. Time O(V² + D).
+    pub(super) fn choose(&mut self, filter: &impl Filter<V>, exits: &Exits) -> Option<u16> {
         self.decisions = self.decisions.wrapping_add(1);
-        let chosen = match self.goal {
+        let here = filter.darts().map(|darts| Here::new(darts, filter.arrival(), exits));
+        let exit = match self.goal {
             Goal::Stop => None,
-            Goal::Explore => self.least_used(&known, exits.count),
+            Goal::Explore => here.and_then(|here| self.explore(filter, &here)).or_else(|| self.any(exits)),
             Goal::Vertex(target) => {
                 self.update_status(filter, target);
-                if self.goal_status == GoalStatus::Active {
-                    self.towards(filter, target, &known, exits.count)
-                } else {
-                    None
+                if self.goal_status != GoalStatus::Active {
+                    return None;
                 }
+                here.and_then(|here| self.towards(target, &here)).or_else(|| self.any(exits))
             }
-        };
-        if let Some(exit) = chosen {
-            self.departures.depart(exits, exit);
-        }
-        chosen
+        }?;
+        exits.as_slice().get(exit).copied()
     }
 
     /// Updates the status of an active goal.
@@ -153,57 +202,63 @@ impl<const V: usize, const HISTORY: usize> RoutePlanner<V, HISTORY> {
         }
     }
 
-    /// The exit with the fewest uses, at random among equals.
-    fn least_used(&self, known: &[Exit; MAX_EXITS], count: u8) -> Option<u8> {
-        let least = known.iter().take(usize::from(count)).map(|exit| exit.uses).min()?;
-        self.at_random(known, count, |exit| exit.uses == least)
+    /// The exit with the shortest travel time to a way that is new, or the one with the fewest passages. At random among equals.
+    fn explore(&self, filter: &impl Filter<V>, here: &Here<'_>) -> Option<usize> {
+        let darts = here.darts;
+        let frames = frames_to_frontier(filter, darts);
+        let to_frontier = |exit: usize| match here.way(exit) {
+            Some(way) if is_frontier(filter, darts, way) => Some(0),
+            _ => here.frames(exit, &frames),
+        };
+        let exits = 0..here.exits.len();
+        if let Some(least) = exits.clone().filter_map(to_frontier).min() {
+            return self.at_random(here.exits.len(), |exit| to_frontier(exit) == Some(least));
+        }
+        let passages =
+            |exit: usize| here.way(exit).filter(|&way| darts.partner(way).is_some()).map(|way| darts.passages(way));
+        let least = exits.filter_map(passages).min()?;
+        self.at_random(here.exits.len(), |exit| passages(exit) == Some(least))
     }
 
-    /// The exit to the neighbour with the fewest edges to the target. If that exit is unknown, one of those that lead to an
-    /// unknown vertex.
-    fn towards(&self, filter: &impl Filter<V>, target: VertexId, known: &[Exit; MAX_EXITS], count: u8) -> Option<u8> {
-        let distances = distances_to(filter, target);
-        let distance = |vertex: VertexId| distances[vertex];
-        let exit_distance = |exit: &Exit| exit.leads_to.and_then(distance);
-        let nearest = known.iter().take(usize::from(count)).filter_map(exit_distance).min();
-        let here = filter.recent(0).and_then(distance);
-        match (nearest, here) {
-            (Some(nearest), Some(here)) if nearest < here => {
-                self.at_random(known, count, |exit| exit_distance(exit) == Some(nearest))
-            }
-            _ => self
-                .at_random(known, count, |exit| exit.leads_to.is_none())
-                .or_else(|| self.at_random(known, count, |_| true)),
+    /// The exit with the shortest travel time to the target. If the map has no path, an exit that is new, or that the map does not
+    /// have.
+    fn towards(&self, target: VertexId, here: &Here<'_>) -> Option<usize> {
+        let frames = frames_to::<V>(here.darts, |vertex| vertex == target);
+        let to_target = |exit: usize| here.frames(exit, &frames);
+        let least = (0..here.exits.len()).filter_map(to_target).min();
+        let is_new = |exit: usize| here.way(exit).is_none_or(|way| here.darts.partner(way).is_none());
+        match least {
+            Some(least) => self.at_random(here.exits.len(), |exit| to_target(exit) == Some(least)),
+            None => self.at_random(here.exits.len(), is_new),
         }
     }
 
-    /// One of the exits that `suits` accepts, each with the same probability.
-    fn at_random(&self, known: &[Exit; MAX_EXITS], count: u8, suits: impl Fn(&Exit) -> bool) -> Option<u8> {
-        let suitable = || (0..count).zip(known).filter(|(_, exit)| suits(exit)).map(|(number, _)| number);
+    /// Any exit.
+    fn any(&self, exits: &Exits) -> Option<usize> {
+        self.at_random(exits.as_slice().len(), |_| true)
+    }
+
+    /// One of the first `count` exits that `suits` accepts, each with the same probability.
+    fn at_random(&self, count: usize, suits: impl Fn(usize) -> bool) -> Option<usize> {
+        let suitable = || (0..count).filter(|&exit| suits(exit));
         let draw = draws(self.seed, u64::from(self.decisions)).next_u32() as usize;
         suitable().nth(draw.checked_rem(suitable().count())?)
     }
 }
 
-/// Whether the best map has a path from the robot's vertex to another one.
-pub(super) fn leads_to<const V: usize>(filter: &impl Filter<V>, vertex: VertexId) -> bool {
-    filter.recent(0).is_some_and(|here| distances_to(filter, vertex)[here].is_some())
+/// Whether a way of the map is new: nobody has driven it, and more than a third of the visits to its vertex have shown it.
+fn is_frontier<const V: usize>(filter: &impl Filter<V>, darts: Darts<'_>, way: DartId) -> bool {
+    let visits = darts.vertex(way).map_or(0, |vertex| filter.map().visits(vertex).min(u8::MAX.into()));
+    darts.partner(way).is_none() && 3 * u32::from(darts.sightings(way)) > visits
 }
 
-/// Number of edges from each vertex of the best map to `target`, by breadth-first search. Time O(V²).
-fn distances_to<const V: usize>(filter: &impl Filter<V>, target: VertexId) -> PerVertex<Option<u8>, V> {
-    let map = filter.map();
-    let mut distances = PerVertex::filled(None);
-    let mut reached = VertexSet::EMPTY;
-    let mut newly = VertexSet::from(target);
-    for steps in 0..V as u8 {
-        let mut next = VertexSet::EMPTY;
-        for vertex in map.vertices().filter(|&vertex| newly.contains(vertex)) {
-            distances[vertex] = Some(steps);
-            next |= map.neighbours(vertex);
-        }
-        reached |= newly;
-        newly = next - reached;
-    }
-    distances
+/// The travel time from each vertex to the nearest one with a way that is new.
+fn frames_to_frontier<const V: usize>(filter: &impl Filter<V>, darts: Darts<'_>) -> PerVertex<Option<u32>, V> {
+    frames_to(darts, |vertex| darts.ways(vertex).any(|way| is_frontier(filter, darts, way)))
+}
+
+/// Whether the best map has a path from the robot's vertex to another one.
+pub(super) fn leads_to<const V: usize>(filter: &impl Filter<V>, vertex: VertexId) -> bool {
+    let (Some(darts), Some(here)) = (filter.darts(), filter.recent(0)) else { return false };
+    frames_to::<V>(darts, |target| target == vertex).get(here).is_some_and(Option::is_some)
 }

@@ -1,7 +1,12 @@
 //! An observation: the fingerprint of a place, and hints that need no odometry.
 
 use super::ways::{Exit, Ways};
-use crate::place::Fingerprint;
+use crate::bearing::{HALF_TURN_MRAD, counter_clockwise_mrad, rotated};
+use crate::place::{Fingerprint, Obstacles, Openings};
+use crate::top_k::TopK;
+
+/// The way by which the robot came is the opening within this angle of where it is expected, in milliradians.
+const ENTRY_MRAD: u16 = 700;
 
 /// How the robot drove from the place before to this one, as far as its drive knows.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -18,6 +23,21 @@ pub struct Passage {
 impl Passage {
     /// Nothing is known.
     pub const UNKNOWN: Self = Self { exit: None, travel_frames: None, entry_mrad: None };
+
+    /// The openings of a place as ways; `None` if there are none. `rotation_mrad` is the change of all bearings since the frame
+    /// that the passage was taken from.
+    ///
+    /// The robot came by the opening within 0.7 rad of `entry_mrad`. Without such an opening, it came by a way that was not seen.
+    pub fn ways(&self, openings: &Openings, rotation_mrad: i32) -> Option<Ways> {
+        let expected_mrad = rotated(self.entry_mrad.unwrap_or(HALF_TURN_MRAD), rotation_mrad);
+        let entry_mrad = openings.nearest(expected_mrad, ENTRY_MRAD).map_or(expected_mrad, |(_, seen_mrad)| seen_mrad);
+        let mut others_mrad = TopK::<u16, { Obstacles::MAX }>::new(0);
+        for &opening_mrad in openings.bearings_mrad().iter().filter(|&&opening_mrad| opening_mrad != entry_mrad) {
+            let relative_mrad = counter_clockwise_mrad(entry_mrad, opening_mrad).clamp(1, 6282);
+            others_mrad.insert(relative_mrad as u16, |one, other| one <= other);
+        }
+        if openings.count() == 0 { None } else { Ways::from_bearings_mrad(others_mrad.as_slice()).ok() }
+    }
 }
 
 /// An observation of a place. `None` stands for a hint that the detector or the drive does not know.

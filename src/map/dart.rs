@@ -103,6 +103,12 @@ impl<'a> Darts<'a> {
         Some(libm::expf(f32::from(holder.ln_travel) / 4096.0) as u16)
     }
 
+    /// The number of passages of the edge of a dart that have a travel time; 0 for a frontier. Saturates at 255.
+    pub fn passages(self, dart: DartId) -> u8 {
+        let holder = self.partner(dart).and_then(|partner| self.dart(dart.min(partner)));
+        holder.map_or(0, |holder| holder.timed)
+    }
+
     /// Every frontier, in the order of their numbers.
     pub fn frontiers(self) -> impl Iterator<Item = DartId> + Clone + use<'a> {
         self.darts().filter(move |&dart| self.partner(dart).is_none())

@@ -2,8 +2,8 @@
 //!
 //! This module depends on the stages whose state it saves; no stage depends on this module.
 
-mod drive;
 mod mapper;
+mod ordered_filter;
 mod paper_filter;
 mod robust_filter;
 pub mod snapshot;
@@ -54,7 +54,7 @@ use snapshot::{Reader, SnapshotError, Writer};
 /// # Ok::<(), SnapshotError>(())
 /// ```
 ///
-/// Every filter and the [`Drive`](crate::drive::Drive) implement it.
+/// Every filter implements it.
 pub trait Persist {
     /// The tag of the section. The library uses tags below 128.
     const SECTION: u8;

@@ -1,8 +1,11 @@
 //! Confirms meet points over several frames, and reports each of them once.
 
+use super::openings::{MergedOpenings, Openings};
+use super::rotation::RotationEstimate;
 use super::scan::{MeetPoint, RingScan};
 use super::smoothing::{DEAD_MM, RangeSmoother, SILENT_MM, bridge_dead_sensors};
 use super::{Fingerprint, PlaceConfig};
+use crate::bearing::{rotated, turn_mrad};
 use crate::config_error::ConfigError;
 use crate::fault::{FaultCounters, FaultKind};
 use crate::ring::{Echo, RingFrame, RingGeometry};
@@ -25,6 +28,9 @@ pub struct Place {
     /// This is the degree of the vertex. An edge that ends within 1.6 times the radius is not counted, nor is one between
     /// two obstacles closer in bearing than `separation_mrad`.
     pub degree: Option<u8>,
+    /// The bearings of the openings that at least half of the averaged frames show, in the frame in which the place is
+    /// reported. `degree` may be another number: it needs the agreement of more frames.
+    pub ways: Openings,
     /// Smallest spread of the meet point's frames, in millimetres: 0 is an ideal meet point.
     pub spread_mm: u16,
 }
@@ -34,13 +40,19 @@ pub struct Place {
 struct Sighting {
     meet_point: MeetPoint,
     frame_index: u32,
+    /// The rotation of all bearings from the start to this frame.
+    turned_mrad: i16,
 }
 
 impl Sighting {
-    const UNSET: Self = Self { meet_point: MeetPoint { spread_mm: 0, radius_mm: 0, openings: 0 }, frame_index: 0 };
+    const UNSET: Self = Self::with_spread(0);
     /// Sorts behind every real sighting.
-    const NONE: Self =
-        Self { meet_point: MeetPoint { spread_mm: u16::MAX, radius_mm: 0, openings: 0 }, frame_index: 0 };
+    const NONE: Self = Self::with_spread(u16::MAX);
+
+    const fn with_spread(spread_mm: u16) -> Self {
+        let meet_point = MeetPoint { spread_mm, radius_mm: 0, openings: Openings::NONE };
+        Self { meet_point, frame_index: 0, turned_mrad: 0 }
+    }
 }
 
 /// Detects places in the frames of a ring of `SONARS` sensors.
@@ -61,6 +73,9 @@ pub struct PlaceDetector<const SONARS: usize> {
     /// The newest frame, smoothed.
     smooth_mm: [u16; SONARS],
     frame_index: u32,
+    rotation: RotationEstimate,
+    /// The rotation of all bearings since the start, −3142 to 3142.
+    turned_mrad: i16,
     /// Whether the robot is still at the place that was reported last.
     is_at_place: bool,
     /// Frames that showed the current meet point.
@@ -84,6 +99,8 @@ impl<const SONARS: usize> PlaceDetector<SONARS> {
             smoother: RangeSmoother::new(),
             smooth_mm: [DEAD_MM; SONARS],
             frame_index: 0,
+            rotation: RotationEstimate::new(),
+            turned_mrad: 0,
             is_at_place: false,
             sightings: 0,
             contrary_frames: 0,
@@ -119,6 +136,8 @@ impl<const SONARS: usize> PlaceDetector<SONARS> {
         self.smooth_mm = [DEAD_MM; SONARS];
         self.smoother.clear();
         self.frame_index = 0;
+        self.rotation = RotationEstimate::new();
+        self.turned_mrad = 0;
         self.is_at_place = false;
         self.faults = FaultCounters::new();
         self.forget_sightings();
@@ -154,12 +173,15 @@ impl<const SONARS: usize> PlaceDetector<SONARS> {
             self.faults.record(FaultKind::RingBlind);
             return None;
         }
-        let meet_point = self.scan().meet_point();
+        let obstacles = self.scan().obstacles();
+        self.rotation.update(&obstacles);
+        self.turned_mrad = rotated(self.turned_mrad, self.rotation.rotation_mrad());
+        let meet_point = self.scan().meet_point(&obstacles);
         if self.is_at_place {
             self.wait_for_departure(meet_point);
             return None;
         }
-        self.confirm(Sighting { meet_point, frame_index })
+        self.confirm(Sighting { meet_point, frame_index, turned_mrad: self.turned_mrad })
     }
 
     /// Returns the newest frame, smoothed.
@@ -170,6 +192,12 @@ impl<const SONARS: usize> PlaceDetector<SONARS> {
             separation_mrad: self.config.separation_mrad,
             equidistance_mm: self.config.equidistance_mm,
         }
+    }
+
+    /// Change of all bearings between the two newest frames in milliradians, counter-clockwise positive: the negative of the
+    /// robot's rotation, estimated from the bearings of the obstacles.
+    pub fn rotation_mrad(&self) -> i32 {
+        self.rotation.rotation_mrad()
     }
 
     /// Whether the newest frame has fewer live sensors than `live_sensors_min`: too few to detect a place or to drive.
@@ -272,19 +300,24 @@ impl<const SONARS: usize> PlaceDetector<SONARS> {
     fn place(&mut self) -> Option<Place> {
         let [best, ..] = self.best;
         let limit_mm = best.meet_point.spread_mm.saturating_add(AVERAGED_SPREAD_MM);
-        let meet_points = self.best.iter().map(|sighting| sighting.meet_point);
-        let close = meet_points.filter(|meet_point| meet_point.spread_mm <= limit_mm);
-        let (count, sum_mm) = close.clone().fold((0u32, 0u32), |(count, sum_mm), meet_point| {
-            (count.saturating_add(1), sum_mm.saturating_add(u32::from(meet_point.radius_mm)))
+        let close = self.best.iter().filter(|sighting| sighting.meet_point.spread_mm <= limit_mm);
+        let (count, sum_mm) = close.clone().fold((0u32, 0u32), |(count, sum_mm), sighting| {
+            (count.saturating_add(1), sum_mm.saturating_add(u32::from(sighting.meet_point.radius_mm)))
         });
         let radius_mm = sum_mm.saturating_add(count / 2).checked_div(count).unwrap_or(0) as u16;
-        let agreed = |degree: u8| close.clone().filter(|meet_point| meet_point.openings == degree).count() as u32;
+        let agreed =
+            |degree: u8| close.clone().filter(|sighting| sighting.meet_point.openings.count() == degree).count() as u32;
         let degree = (1..=6).find(|degree| agreed(*degree).saturating_mul(4) >= count.saturating_mul(3));
         let Ok(fingerprint) = Fingerprint::from_radius_mm(radius_mm) else {
             self.faults.record(FaultKind::RadiusOutOfRange);
             return None;
         };
-        Some(Place { fingerprint, frame_index: best.frame_index, degree, spread_mm: best.meet_point.spread_mm })
+        let mut ways = MergedOpenings::new();
+        close.for_each(|sighting| {
+            ways.add(&sighting.meet_point.openings, turn_mrad(sighting.turned_mrad, self.turned_mrad));
+        });
+        let (frame_index, spread_mm) = (best.frame_index, best.meet_point.spread_mm);
+        Some(Place { fingerprint, frame_index, degree, ways: ways.agreed(), spread_mm })
     }
 }
 

@@ -9,6 +9,11 @@ use crate::top_k::TopK;
 /// 1.41 times the radius of the inscribed disc.
 const OPEN_PERCENT: u32 = 160;
 
+/// Openings of two scans within this angle are the same, in milliradians.
+const SAME_OPENING_MRAD: i32 = 500;
+/// The most different openings of the merged scans.
+const MERGED_MAX: usize = 8;
+
 /// Bearings of the openings between the equidistant obstacles of a scan, at most [`Obstacles::MAX`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Openings {
@@ -16,6 +21,14 @@ pub struct Openings {
 }
 
 impl Openings {
+    /// No openings.
+    pub const NONE: Self = Self { bearings_mrad: TopK::new(0) };
+
+    /// The number of openings.
+    pub fn count(&self) -> u8 {
+        self.bearings_mrad().len() as u8
+    }
+
     /// Bearings in milliradians in ascending order: counter-clockwise from straight behind.
     pub fn bearings_mrad(&self) -> &[i16] {
         self.bearings_mrad.as_slice()
@@ -27,6 +40,48 @@ impl Openings {
         let openings = self.bearings_mrad().iter().copied().enumerate();
         let nearest = openings.min_by_key(|&(_, opening_mrad)| off_mrad(opening_mrad));
         nearest.filter(|&(_, opening_mrad)| off_mrad(opening_mrad) <= i32::from(within_mrad))
+    }
+}
+
+/// The openings of several scans, merged by their bearings.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct MergedOpenings {
+    /// The mean bearing of each opening, and the number of scans that show it.
+    openings: [(i16, u8); MERGED_MAX],
+    scans: u8,
+}
+
+impl MergedOpenings {
+    pub(super) const fn new() -> Self {
+        Self { openings: [(0, 0); MERGED_MAX], scans: 0 }
+    }
+
+    /// Adds the openings of a scan, rotated by `by_mrad`.
+    pub(super) fn add(&mut self, openings: &Openings, by_mrad: i32) {
+        self.scans = self.scans.saturating_add(1);
+        for &bearing_mrad in openings.bearings_mrad() {
+            let bearing_mrad = rotated(bearing_mrad, by_mrad);
+            let is_same = |&&mut (mean_mrad, scans): &&mut (i16, u8)| {
+                scans == 0 || turn_mrad(mean_mrad, bearing_mrad).abs() <= SAME_OPENING_MRAD
+            };
+            if let Some((mean_mrad, scans)) = self.openings.iter_mut().find(is_same) {
+                let weight = i32::from(*scans) + 1;
+                *scans = scans.saturating_add(1);
+                let off_mrad = if weight == 1 { 0 } else { turn_mrad(*mean_mrad, bearing_mrad) / weight };
+                *mean_mrad = if weight == 1 { bearing_mrad } else { rotated(*mean_mrad, off_mrad) };
+            }
+        }
+    }
+
+    /// The openings that at least half of the scans show.
+    pub(super) fn agreed(&self) -> Openings {
+        let mut bearings_mrad = TopK::new(0);
+        for &(mean_mrad, scans) in &self.openings {
+            if scans > 0 && scans.saturating_mul(2) >= self.scans {
+                bearings_mrad.insert(mean_mrad, |one, other| one <= other);
+            }
+        }
+        Openings { bearings_mrad }
     }
 }
 

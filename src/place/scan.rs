@@ -1,5 +1,6 @@
 //! One smoothed reading of the ring, and the closest obstacles in it, in separate bearings.
 
+use super::openings::Openings;
 use super::smoothing::{DEAD_MM, SILENT_MM, is_echo};
 use crate::bearing::{rotated, turn_mrad};
 use crate::ring::{Echo, RingGeometry};
@@ -64,8 +65,8 @@ pub(super) struct MeetPoint {
     pub(super) spread_mm: u16,
     /// Mean range of the equidistant obstacles.
     pub(super) radius_mm: u16,
-    /// Number of openings between the equidistant obstacles.
-    pub(super) openings: u8,
+    /// The openings between the equidistant obstacles.
+    pub(super) openings: Openings,
 }
 
 impl Obstacles {
@@ -153,9 +154,8 @@ impl<const SONARS: usize> RingScan<'_, SONARS> {
     }
 
     /// Measures how well the scan shows a meet point.
-    pub(super) fn meet_point(&self) -> MeetPoint {
-        let obstacles = self.obstacles();
-        let openings = self.openings(&obstacles).bearings_mrad().len() as u8;
+    pub(super) fn meet_point(&self, obstacles: &Obstacles) -> MeetPoint {
+        let openings = self.openings(obstacles);
         let spread_mm = obstacles.spread_mm().unwrap_or(u16::MAX);
         MeetPoint { spread_mm, radius_mm: obstacles.radius_mm(), openings }
     }
@@ -233,16 +233,17 @@ mod tests {
     #[test]
     fn a_corridor_has_two_equidistant_obstacles_and_a_distant_third() {
         let ranges = [4000, 1400, 1000, 1400, SILENT_MM, 1400, 1010, 1400];
-        let meet_point = scan(&ranges, 1047).meet_point();
-        assert_eq!((meet_point.spread_mm, meet_point.radius_mm, meet_point.openings), (3000, 1005, 2));
+        let scan = scan(&ranges, 1047);
+        let meet_point = scan.meet_point(&scan.obstacles());
+        assert_eq!((meet_point.spread_mm, meet_point.radius_mm, meet_point.openings.count()), (3000, 1005, 2));
     }
 
     #[test]
     fn a_dead_end_has_three_equidistant_obstacles_and_one_opening_behind() {
         let ranges = [1020, 1400, 1000, 1400, SILENT_MM, 1400, 1010, 1400];
         let scan = scan(&ranges, 1047);
-        let meet_point = scan.meet_point();
-        assert_eq!((meet_point.spread_mm, meet_point.radius_mm, meet_point.openings), (20, 1010, 1));
+        let meet_point = scan.meet_point(&scan.obstacles());
+        assert_eq!((meet_point.spread_mm, meet_point.radius_mm, meet_point.openings.count()), (20, 1010, 1));
         let openings = scan.openings(&scan.obstacles());
         assert!(matches!(openings.bearings_mrad(), [opening] if turn_mrad(*opening, 3142).abs() <= 4), "{openings:?}");
         assert_eq!(openings.nearest(0, 1000), None);
@@ -252,8 +253,8 @@ mod tests {
     fn a_crossing_has_four_equidistant_obstacles_and_four_openings() {
         let ranges = [5000, 1400, SILENT_MM, 1400, SILENT_MM, 1410, 4000, 1420];
         let scan = scan(&ranges, 1047);
-        let meet_point = scan.meet_point();
-        assert_eq!((meet_point.spread_mm, meet_point.radius_mm, meet_point.openings), (10, 1407, 4));
+        let meet_point = scan.meet_point(&scan.obstacles());
+        assert_eq!((meet_point.spread_mm, meet_point.radius_mm, meet_point.openings.count()), (10, 1407, 4));
         let openings = scan.openings(&scan.obstacles());
         for expected_mrad in [-1571, 0, 1571, 3142] {
             assert!(openings.nearest(expected_mrad, 4).is_some(), "{expected_mrad} in {openings:?}");

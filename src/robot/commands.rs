@@ -41,8 +41,8 @@ where
             Command::GetMap => self.reporter.send_full(),
             Command::GetSnapshot { offset } => {
                 if offset == 0 {
-                    let Self { mapper, drive, staging, .. } = self;
-                    staging.take(|buffer| snapshot(mapper, drive, buffer).ok())?;
+                    let Self { mapper, staging, .. } = self;
+                    staging.take(|buffer| snapshot(mapper, buffer).ok())?;
                 }
                 return self.staging.outgoing_chunk(offset);
             }

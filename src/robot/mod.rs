@@ -62,7 +62,7 @@ use crate::fault::{FaultCounters, FaultKind};
 use crate::filter::{Filter, Update};
 use crate::mapper::Mapper;
 use crate::persist::Persist;
-use crate::persist::snapshot::{Resume, Snapshot, SnapshotError, SnapshotPolicy, Writer};
+use crate::persist::snapshot::{Resume, SnapshotError, SnapshotPolicy, Writer};
 use crate::place::Place;
 use crate::ring::RingFrame;
 use crate::wire::{
@@ -73,8 +73,6 @@ use crate::wire::{
 const FRAMES_PER_HELLO: u16 = 100;
 /// How often the robot sends a `Health`, in turns of the loop.
 const TURNS_PER_HEALTH: u32 = 256;
-/// The places whose exits the drive remembers.
-const DEPARTURES: usize = 400;
 /// The most bytes that are read from the board in a turn. The inbox decodes fewer and drops the rest.
 const RECEIVED_PER_TURN: usize = 1024;
 
@@ -91,7 +89,7 @@ pub struct Robot<'buffer, const SONARS: usize, const V: usize, F: Filter<V>> {
     config: RobotConfig<SONARS, F::Config>,
     mapper: Mapper<SONARS, V, F>,
     reporter: Reporter<V>,
-    drive: Drive<V, DEPARTURES>,
+    drive: Drive<V>,
     inbox: Inbox,
     staging: Staging<'buffer>,
     encoder: Encoder,
@@ -235,11 +233,11 @@ where
         (None, VelocityCommand::STOP)
     }
 
-    /// Writes a snapshot of drive and mapper to the board's store.
+    /// Writes a snapshot to the board's store.
     #[inline(never)]
     fn save_snapshot(&mut self, board: &mut impl Board) {
-        let Self { mapper, drive, staging, .. } = self;
-        let taken = staging.take(|buffer| snapshot(mapper, drive, buffer).ok());
+        let Self { mapper, staging, .. } = self;
+        let taken = staging.take(|buffer| snapshot(mapper, buffer).ok());
         match taken.map(|()| board.save(staging.taken())) {
             Ok(Ok(())) => {
                 self.stored_bytes = u16::try_from(self.staging.taken().len()).unwrap_or(u16::MAX);
@@ -328,7 +326,7 @@ where
     }
 
     /// The drive.
-    pub const fn drive(&self) -> &Drive<V, DEPARTURES> {
+    pub const fn drive(&self) -> &Drive<V> {
         &self.drive
     }
 }
@@ -362,34 +360,25 @@ impl<BOARD: Board> Line<'_, BOARD> {
     }
 }
 
-/// Writes a whole snapshot: the drive's section, then the mapper's in the remaining room.
+/// Writes a whole snapshot.
 fn snapshot<const SONARS: usize, const V: usize, F: Filter<V> + Persist>(
     mapper: &mut Mapper<SONARS, V, F>,
-    drive: &mut Drive<V, DEPARTURES>,
     buffer: &mut [u8],
 ) -> Result<usize, SnapshotError> {
     let mut writer = Writer::new(buffer)?;
-    writer.stage(drive)?;
     mapper.save(&mut writer)?;
     writer.finish()
 }
 
-/// Restores a snapshot. A snapshot without the drive's section is from a robot driven by hand.
+/// Restores a snapshot; the drive explores from there.
 fn restore<const SONARS: usize, const V: usize, F: Filter<V> + Persist>(
     mapper: &mut Mapper<SONARS, V, F>,
-    drive: &mut Drive<V, DEPARTURES>,
+    drive: &mut Drive<V>,
     bytes: &[u8],
     resume: Resume,
 ) -> Result<(), SnapshotError> {
-    let section = Snapshot::open(bytes)?.section(Drive::<V, DEPARTURES>::SECTION);
-    if let Some(section) = section {
-        drive.check(section)?;
-    }
     mapper.restore(bytes, resume)?;
-    match section {
-        Some(section) => drive.restore(section)?,
-        None => drive.resume(core::iter::empty()),
-    }
+    drive.resume();
     if resume == Resume::AtUnknownVertex {
         drive.kidnapped();
     }

@@ -21,13 +21,14 @@
 //! ```
 
 use toposlam::place::Place;
-use toposlam::reference::{self, VERTICES, paper};
+use toposlam::reference::robust::{self, VERTICES};
+use toposlam::reference::{self, paper};
 use toposlam::ring::{RingFrame, RingGeometry};
 use toposlam::{ConfigError, FaultCounters, Filter, Map, Mapper, MapperConfig, Passage, Update};
 
 use toposlam_sim::Step;
 use toposlam_sim::exploration::Exploration;
-use toposlam_sim::world::TrueMap;
+use toposlam_sim::world::{Told, TrueMap};
 
 use crate::ancestry::Ancestry;
 use crate::graph::Graph;
@@ -54,7 +55,7 @@ trait Stages<const SONARS: usize> {
 }
 
 /// The stages with the robust filter.
-struct Robust<const SONARS: usize>(Box<Mapper<SONARS, VERTICES, reference::Filter>>);
+struct Robust<const SONARS: usize>(Box<Mapper<SONARS, VERTICES, robust::Filter>>);
 
 impl<const SONARS: usize> Stages<SONARS> for Robust<SONARS> {
     fn observe(&mut self, frame: &RingFrame<SONARS>, passage: Passage) -> Option<(Place, Update)> {
@@ -130,7 +131,7 @@ impl Mapping<SONARS_MAX> {
 impl<const SONARS: usize> Mapping<SONARS> {
     fn start(geometry: RingGeometry<SONARS>, filter: FilterChoice) -> Result<Self, ConfigError> {
         let stages: Box<dyn Stages<SONARS>> = match filter {
-            FilterChoice::Robust => Box::new(Robust(started(geometry, reference::FILTER)?)),
+            FilterChoice::Robust => Box::new(Robust(started(geometry, robust::FILTER)?)),
             FilterChoice::Paper => Box::new(Paper(started(geometry, paper::FILTER)?, Ancestry::new())),
         };
         Ok(Self { stages, steps: Vec::new() })
@@ -141,7 +142,8 @@ impl<const SONARS: usize> Mapping<SONARS> {
     pub fn observe(&mut self, frame: &RingFrame<SONARS>, passage: Passage) -> Option<Step> {
         let (place, update) = self.stages.observe(frame, passage)?;
         let map = self.map();
-        let step = Step { place, update, vertices: map.vertices().len() as u8, edges: map.edges().count() };
+        let told = Told { passage, ways: passage.ways(&place.ways, 0) };
+        let step = Step { place, told, update, vertices: map.vertices().len() as u8, edges: map.edges().count() };
         self.steps.push(step);
         Some(step)
     }

@@ -3,11 +3,15 @@
 use toposlam::Update;
 use toposlam::place::Place;
 
+use crate::world::Told;
+
 /// One detected place and its effect on the map.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Step {
     /// The place that the detector reported.
     pub place: Place,
+    /// The hints of the drive.
+    pub told: Told,
     /// The filter's update for the place.
     pub update: Update,
     /// Number of vertices of the best map after the update.
@@ -18,7 +22,7 @@ pub struct Step {
 
 impl std::fmt::Display for Step {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        let Self { place, update, vertices, edges } = self;
+        let Self { place, update, vertices, edges, .. } = self;
         write!(
             f,
             "place {:4}  frame {:6}  radius {:4} mm  vertex {:2}{}  map of {vertices:2} vertices, {edges:2} edges, {} mm",

@@ -39,13 +39,13 @@ pub const SNAPSHOT_VERSION: u16 = 2;
 
 /// The tag of the filter's section.
 pub const FILTER_SECTION: u8 = 1;
-/// The tag of the drive's section.
-pub const DRIVE_SECTION: u8 = 2;
 
 /// The first byte of the filter's section: the kind of filter.
 pub(crate) const ROBUST: u8 = 1;
 /// As [`ROBUST`], of the paper's filter.
 pub(crate) const PAPER: u8 = 2;
+/// As [`ROBUST`], of the ordered filter.
+pub(crate) const ORDERED: u8 = 3;
 
 /// The first bytes of every snapshot.
 const MAGIC: [u8; 4] = *b"TSLM";

@@ -6,6 +6,7 @@ use std::path::PathBuf;
 use anyhow::Context;
 use clap::Args;
 use toposlam::persist::Persist;
+use toposlam::reference::SONARS;
 use toposlam::wire::{FilterSettings, map_digest};
 use toposlam::{FaultCounters, Filter, Map};
 use toposlam_cli::picture::{Drawing, draw};
@@ -48,7 +49,12 @@ pub(super) fn fault_rate(text: &str) -> Result<f64, String> {
 impl DriveArguments {
     /// The floor plan, and the robot with its noise.
     pub(super) fn world(&self) -> anyhow::Result<(Plan, RobotModel)> {
-        Ok((load_plan(&self.plan)?, RobotModel::default().with_noise(self.noise)))
+        self.world_for_ring(SONARS)
+    }
+
+    /// The floor plan, and a robot with this many sonars and its noise.
+    pub(super) fn world_for_ring(&self, sonars: usize) -> anyhow::Result<(Plan, RobotModel)> {
+        Ok((load_plan(&self.plan)?, RobotModel::for_ring(sonars).with_noise(self.noise)))
     }
 
     /// The floor plan argument.
@@ -100,7 +106,7 @@ pub(super) struct Summary<'a, const V: usize> {
 
 impl<'a, const V: usize> Summary<'a, V> {
     /// Summarises an exploration.
-    pub(super) fn of<F>(plan: &'a Plan, exploration: &'a Exploration<'_, V, F>) -> Self
+    pub(super) fn of<F, const S: usize>(plan: &'a Plan, exploration: &'a Exploration<'_, V, F, S>) -> Self
     where
         F: Filter<V, Config: FilterSettings> + Persist,
     {

@@ -9,7 +9,7 @@ use toposlam_eval::mapping::score_exploration;
 use toposlam_eval::parallel;
 use toposlam_sim::exploration::Exploration;
 use toposlam_sim::injector::FaultRates;
-use toposlam_sim::world::{Plan, Report, RobotModel};
+use toposlam_sim::world::{HintReport, Plan, Report, RobotModel, Told};
 
 use super::drive::{fault_rate, load_plan, noise_factor, number_in};
 
@@ -52,6 +52,7 @@ pub(crate) struct Arguments {
 /// The result of one run.
 struct Run {
     report: Report,
+    hints: HintReport,
     exact: bool,
     complete: bool,
     locations: f64,
@@ -79,14 +80,23 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
          | Degree seen / right | Way lost | Bumps | Frames per place | Goals reached / commanded / reached elsewhere |"
     );
     println!("|---|---|---|---|---|---|---|---|---|---|---|---|");
+    let mut rows = Vec::new();
     for name in &arguments.plans {
         let plan = load_plan(name)?;
         for &noise in &arguments.noises {
             let runs = parallel::map(arguments.runs, 0, |run| one(arguments, &plan, noise, run as u64 + 1))?;
             let runs: Result<Vec<Run>, _> = runs.into_iter().collect();
-            print_row(name, noise, &runs?, arguments.places);
+            let runs = runs?;
+            print_row(name, noise, &runs, arguments.places);
+            rows.push(hint_row(name, noise, &runs));
         }
     }
+    println!(
+        "\n| Plan | Noise | Exits wrong / unknown | Ways missed / false, of the true ones | Ways unknown | Bearing error, \
+         sd / 90 % | Travel time error, sd / 90 %; each direction apart, sd |"
+    );
+    println!("|---|---|---|---|---|---|---|");
+    rows.iter().for_each(|row| println!("{row}"));
     Ok(())
 }
 
@@ -113,8 +123,10 @@ fn one(arguments: &Arguments, plan: &Plan, noise: f64, seed: u64) -> anyhow::Res
     }
     let score = score_exploration(&exploration);
     let seen: std::collections::BTreeSet<usize> = exploration.nodes().iter().copied().flatten().collect();
+    let told: Vec<Told> = exploration.steps().iter().map(|step| step.told).collect();
     let mut run = Run {
         report: exploration.ground_truth().report(),
+        hints: exploration.ground_truth().hint_report(&told),
         exact: score.exact,
         complete: seen.len() == exploration.rover().true_map().nodes.len(),
         locations: score.location,
@@ -157,6 +169,35 @@ fn travel(exploration: &mut Exploration<'_>, journeys: u64, seed: u64) -> Journe
         }
     }
     outcome
+}
+
+/// The error rates of the hints.
+fn hint_row(name: &str, noise: f64, runs: &[Run]) -> String {
+    let mut all = HintReport::default();
+    runs.iter().for_each(|run| all.add(&run.hints));
+    let percent = |part: usize, whole: usize| 100.0 * part as f64 / whole.max(1) as f64;
+    let deviation = |errors: &[f64]| {
+        (errors.iter().map(|error| error * error).sum::<f64>() / errors.len().max(1) as f64).sqrt()
+    };
+    let rank = |errors: &[f64]| {
+        let mut sizes: Vec<f64> = errors.iter().map(|error| error.abs()).collect();
+        sizes.sort_by(f64::total_cmp);
+        sizes.get((0.9 * sizes.len() as f64) as usize).copied().unwrap_or(0.0)
+    };
+    let HintReport { exits, places, ways, bearing_errors_rad, travel_errors, one_way_travel_errors, .. } = &all;
+    format!(
+        "| {name} | {noise} | {:.2} / {:.2} % | {:.2} / {:.2} % | {:.2} % | {:.0} / {:.0} mrad | {:.1} / {:.1} %; {:.1} % |",
+        percent(exits.1, exits.0),
+        percent(exits.2, exits.0 + exits.2),
+        percent(ways.1, ways.0),
+        percent(ways.2, ways.0),
+        percent(places.1, places.0 + places.1),
+        1000.0 * deviation(bearing_errors_rad),
+        1000.0 * rank(bearing_errors_rad),
+        100.0 * deviation(travel_errors),
+        100.0 * rank(travel_errors),
+        100.0 * deviation(one_way_travel_errors),
+    )
 }
 
 fn print_row(name: &str, noise: f64, runs: &[Run], places: usize) {

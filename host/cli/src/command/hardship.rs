@@ -12,7 +12,7 @@ use std::{
 use anyhow::{Context, bail, ensure};
 use toposlam::drive::VelocityCommand;
 use toposlam::persist::snapshot::Resume;
-use toposlam::place::Place;
+use toposlam::place::{Openings, Place};
 use toposlam::reference::{SNAPSHOT_BYTES, SONARS};
 use toposlam::ring::RingFrame;
 use toposlam::wire::{Command, Encoder, MAX_FRAME_BYTES, Message, Outcome, Reply, Request};
@@ -101,7 +101,7 @@ pub(super) fn run(
                         // The frame counts of the firmware and of the world may differ.
                         let ago = turns.saturating_sub(frame_index);
                         let frame_index = trial.frames.saturating_sub(ago + 1);
-                        trial.exploration.note(&Place { fingerprint, frame_index, degree, spread_mm: 0 });
+                        trial.exploration.note(&Place { fingerprint, frame_index, degree, ways: Openings::NONE, spread_mm: 0 });
                         bar.increment();
                     }
                     Message::Velocity(drive) => {

@@ -11,10 +11,13 @@ const MATCH_MM: f64 = 500.0;
 /// Largest offset between a visit and a place that belongs to it, in frames.
 const MATCH_FRAMES: u32 = 30;
 
+/// A robot that drove a way is at most this far from it, at each quarter of the time, in millimetres.
+const ON_WAY_MM: f64 = 1500.0;
+
 /// One visit to a true node.
 #[derive(Clone, Copy, Debug)]
-struct Visit {
-    node: usize,
+pub(super) struct Visit {
+    pub(super) node: usize,
     first_frame: u32,
     last_frame: u32,
 }
@@ -39,9 +42,9 @@ pub struct Detection {
 
 /// A log of a drive: the visited nodes and the detected places. Memory grows by some 40 bytes per frame.
 pub struct GroundTruth {
-    map: TrueMap,
-    truths: Vec<Truth>,
-    visits: Vec<Visit>,
+    pub(super) map: TrueMap,
+    pub(super) truths: Vec<Truth>,
+    pub(super) visits: Vec<Visit>,
     detections: Vec<Detection>,
 }
 
@@ -96,6 +99,46 @@ impl GroundTruth {
         detection
     }
 
+    /// For each visit but the first the way by which the robot left the node before: its edge, and whether the edge was driven
+    /// from its second node. `None` where it did not drive along an edge.
+    pub fn driven(&self) -> Vec<Option<(usize, bool)>> {
+        self.visits.windows(2).map(|visits| self.driven_between(visits[0], visits[1])).collect()
+    }
+
+    fn driven_between(&self, from: Visit, to: Visit) -> Option<(usize, bool)> {
+        let (first, last) = (from.last_frame as usize, to.first_frame as usize);
+        let position = |share: f64| {
+            let frame = first + ((last - first) as f64 * share) as usize;
+            self.truths.get(frame).map(|truth| truth.pose.position)
+        };
+        let off_mm = |edge: usize, is_reversed: bool| {
+            let off_mm = |share: f64| {
+                let on_way = self.map.edges[edge].point_at(if is_reversed { 1.0 - share } else { share });
+                position(share).map_or(f64::MAX, |position| position.distance_mm(on_way))
+            };
+            [0.25, 0.5, 0.75].map(off_mm).into_iter().fold(0.0, f64::max)
+        };
+        let ways = (0..self.map.edges.len()).flat_map(|edge| [(edge, false), (edge, true)]);
+        let joins = |&(edge, is_reversed): &(usize, bool)| {
+            let nodes = self.map.edges[edge].nodes;
+            nodes == if is_reversed { [to.node, from.node] } else { [from.node, to.node] }
+        };
+        let offs = ways.filter(joins).map(|(edge, is_reversed)| (off_mm(edge, is_reversed), (edge, is_reversed)));
+        let nearest = offs.min_by(|one, other| one.0.total_cmp(&other.0));
+        nearest.filter(|(off_mm, _)| *off_mm <= ON_WAY_MM).map(|(_, way)| way)
+    }
+
+    /// The visit that each detected place belongs to; `None` for a phantom.
+    pub(super) fn visits_of_places(&self) -> Vec<Option<usize>> {
+        let visit_of = |detection: &Detection| {
+            let frames_off = |visit: &Visit| visit.frames_off(detection.place.frame_index);
+            let begun = self.visits.iter().enumerate().filter(|(_, visit)| Some(visit.node) == detection.node);
+            let nearest = begun.min_by_key(|(_, visit)| frames_off(visit));
+            nearest.filter(|(_, visit)| frames_off(visit) <= MATCH_FRAMES).map(|(index, _)| index)
+        };
+        self.detections.iter().map(visit_of).collect()
+    }
+
     /// Number of visits to true nodes that have begun so far.
     pub fn visits(&self) -> usize {
         self.visits.len()
@@ -120,16 +163,13 @@ impl GroundTruth {
             degrees: (0, 0),
             nodes: vec![(0, 0); self.map.nodes.len()],
         };
-        for Detection { place, node, .. } in &self.detections {
-            let begun = self.visits.iter().enumerate().filter(|(_, visit)| Some(visit.node) == *node);
-            let visit = begun.min_by_key(|(_, visit)| visit.frames_off(place.frame_index));
-            let Some((index, visit)) = visit.filter(|(_, visit)| visit.frames_off(place.frame_index) <= MATCH_FRAMES)
-            else {
+        for (Detection { place, .. }, index) in self.detections.iter().zip(self.visits_of_places()) {
+            let Some(index) = index else {
                 report.phantom += 1;
                 continue;
             };
             places_of[index] += 1;
-            let truth = &self.map.nodes[visit.node];
+            let truth = &self.map.nodes[self.visits[index].node];
             report.radius_errors_mm.push(f64::from(place.fingerprint.radius_mm()) - truth.radius_mm);
             if let Some(degree) = place.degree {
                 report.degrees.0 += 1;

@@ -21,6 +21,7 @@
 //! ```
 
 mod ground_truth;
+mod hints;
 mod plan;
 mod ray_casting;
 mod rover;
@@ -28,11 +29,12 @@ mod simulation;
 mod voronoi;
 
 pub use ground_truth::{Detection, GroundTruth, Report};
+pub use hints::{HintReport, Told};
 pub use plan::{Plan, PlanError};
 pub use ray_casting::{SONARS, SonarModel};
 pub use rover::{BodyModel, Rover};
 pub use simulation::{Pose, RobotModel, Simulation, Truth};
-pub use voronoi::{TrueEdge, TrueMap, TrueNode, VoronoiError};
+pub use voronoi::{TrueEdge, TrueMap, TrueNode, TrueWay, VoronoiError};
 
 /// A point of the floor plan, in millimetres from its lower left corner; x to the right, y up.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]

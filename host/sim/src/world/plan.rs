@@ -68,10 +68,14 @@ impl std::error::Error for PlanError {}
 
 impl Plan {
     /// The plans that are compiled in, by name.
-    pub const BUILT_IN: [(&'static str, &'static str); 3] = [
+    pub const BUILT_IN: [(&'static str, &'static str); 7] = [
         ("ring", include_str!("../../plans/ring.txt")),
         ("office", include_str!("../../plans/office.txt")),
         ("flat", include_str!("../../plans/flat.txt")),
+        ("grid", include_str!("../../plans/grid.txt")),
+        ("plus", include_str!("../../plans/plus.txt")),
+        ("comb", include_str!("../../plans/comb.txt")),
+        ("ladder", include_str!("../../plans/ladder.txt")),
     ];
 
     /// The built-in plan of this name.

@@ -37,6 +37,44 @@ pub struct TrueEdge {
     pub way: Vec<Point>,
 }
 
+/// One end of an edge at one of its nodes.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct TrueWay {
+    /// The edge.
+    pub edge: usize,
+    /// Whether the node is the second of the edge.
+    pub is_reversed: bool,
+    /// Direction of the point where the edge leaves the disc of the node, counter-clockwise from the x axis, in radians.
+    pub bearing_rad: f64,
+}
+
+impl TrueWay {
+    /// The edge and the end, for comparison.
+    pub const fn dart(&self) -> (usize, bool) {
+        (self.edge, self.is_reversed)
+    }
+}
+
+impl TrueEdge {
+    /// Length of the polyline, in millimetres.
+    pub fn length_mm(&self) -> f64 {
+        self.way.windows(2).map(|ends| ends[0].distance_mm(ends[1])).sum()
+    }
+
+    /// The point at this fraction of the polyline.
+    pub fn point_at(&self, share: f64) -> Point {
+        let mut left_mm = share * self.length_mm();
+        for ends in self.way.windows(2) {
+            let leg_mm = ends[0].distance_mm(ends[1]);
+            if left_mm <= leg_mm {
+                return ends[0].towards(ends[1], if leg_mm > 0.0 { left_mm / leg_mm } else { 0.0 });
+            }
+            left_mm -= leg_mm;
+        }
+        self.way.last().copied().unwrap_or_default()
+    }
+}
+
 /// The true places of a floor plan and their connections, as far as they are reachable from the start.
 #[derive(Clone, Debug, PartialEq)]
 pub struct TrueMap {
@@ -113,6 +151,33 @@ impl TrueMap {
             return Err(VoronoiError::NoPlace);
         }
         Ok(Self { edges: skeleton.chains(&node_of), nodes })
+    }
+
+    /// The ways of a node, counter-clockwise by their bearing from its position. A loop is two of them.
+    pub fn ways(&self, node: usize) -> Vec<TrueWay> {
+        let mut ways = Vec::new();
+        for (edge, true_edge) in self.edges.iter().enumerate() {
+            for is_reversed in [false, true] {
+                if true_edge.nodes[usize::from(is_reversed)] == node {
+                    ways.push(self.way(edge, is_reversed));
+                }
+            }
+        }
+        ways.sort_by(|one, other| one.bearing_rad.total_cmp(&other.bearing_rad));
+        ways
+    }
+
+    /// One end of an edge: the first node is that of the way, or the second if it is reversed.
+    pub fn way(&self, edge: usize, is_reversed: bool) -> TrueWay {
+        let TrueEdge { nodes, way } = &self.edges[edge];
+        let node = &self.nodes[nodes[usize::from(is_reversed)]];
+        let mut points: Vec<Point> = way.clone();
+        if is_reversed {
+            points.reverse();
+        }
+        let is_outside = |point: &&Point| node.position.distance_mm(**point) >= node.radius_mm;
+        let aim = points.iter().find(is_outside).or(points.last()).copied().unwrap_or_default();
+        TrueWay { edge, is_reversed, bearing_rad: node.position.direction_to(aim) }
     }
 
     /// The node nearest to a point, and its distance in millimetres.

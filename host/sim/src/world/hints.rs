@@ -1,0 +1,135 @@
+//! Compares the hints of the drive with the ground truth: exits, ways, bearings and travel times.
+
+use std::collections::BTreeMap;
+use std::f64::consts::TAU;
+
+use toposlam::{Exit, Passage, Ways};
+
+use super::GroundTruth;
+use super::ray_casting::wrapped;
+
+/// A bearing that was told belongs to the true way within this angle, in radians.
+const SAME_WAY_RAD: f64 = 0.55;
+
+/// The hints of one detected place.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Told {
+    /// How the robot drove to the place.
+    pub passage: Passage,
+    /// The ways that it saw there.
+    pub ways: Option<Ways>,
+}
+
+/// Counts of right, wrong and missing hints. Places count where the robot drove along one edge from the place before.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct HintReport {
+    /// Number of exits that were told, of wrong ones among them, and of exits that were not told.
+    pub exits: (usize, usize, usize),
+    /// Number of places whose ways were told, and of places whose ways were not.
+    pub places: (usize, usize),
+    /// Number of true ways, other than the one the robot came by, at places whose ways were told; of those that were missed; and
+    /// of ways that were told and do not exist.
+    pub ways: (usize, usize, usize),
+    /// Told minus true bearing of each way that was found, in radians.
+    pub bearing_errors_rad: Vec<f64>,
+    /// ln of each travel time minus the mean of its edge. Edges with one passage do not count.
+    pub travel_errors: Vec<f64>,
+    /// The same with the mean of each direction of an edge.
+    pub one_way_travel_errors: Vec<f64>,
+    /// Number of travel times that were not told.
+    pub unknown_travels: usize,
+}
+
+impl HintReport {
+    /// Adds the counts of another report.
+    pub fn add(&mut self, other: &Self) {
+        self.exits = (self.exits.0 + other.exits.0, self.exits.1 + other.exits.1, self.exits.2 + other.exits.2);
+        self.places = (self.places.0 + other.places.0, self.places.1 + other.places.1);
+        self.ways = (self.ways.0 + other.ways.0, self.ways.1 + other.ways.1, self.ways.2 + other.ways.2);
+        self.bearing_errors_rad.extend(&other.bearing_errors_rad);
+        self.travel_errors.extend(&other.travel_errors);
+        self.one_way_travel_errors.extend(&other.one_way_travel_errors);
+        self.unknown_travels += other.unknown_travels;
+    }
+}
+
+impl GroundTruth {
+    /// Compares the hints of all detected places, in their order, with the truth.
+    pub fn hint_report(&self, told: &[Told]) -> HintReport {
+        let mut report = HintReport::default();
+        let driven = self.driven();
+        let visits = self.visits_of_places();
+        let mut travels: BTreeMap<(usize, bool), Vec<f64>> = BTreeMap::new();
+        for (place, told) in told.iter().enumerate().skip(1) {
+            let (Some(Some(before)), Some(Some(now))) = (visits.get(place - 1), visits.get(place)) else { continue };
+            if *now != before + 1 {
+                continue;
+            }
+            let Some(&Some((edge, is_reversed))) = driven.get(*before) else { continue };
+            if let Some(frames) = told.passage.travel_frames {
+                travels.entry((edge, is_reversed)).or_default().push(f64::from(frames).ln());
+            } else {
+                report.unknown_travels += 1;
+            }
+            let arrival = self.map.way(edge, !is_reversed);
+            if let Some(ways) = told.ways {
+                report.places.0 += 1;
+                let others = ways.others().unwrap_or(&[]).iter();
+                let seen: Vec<f64> = others.map(|&other| f64::from(other) / 256.0 * TAU).collect();
+                self.compare_ways(&mut report, self.visits[*now].node, arrival.dart(), &seen);
+            } else {
+                report.places.1 += 1;
+            }
+            // The exit is relative to the way by which the robot came to the place before.
+            let Some(&Some((edge_before, reversed_before))) = before.checked_sub(1).and_then(|visit| driven.get(visit))
+            else {
+                continue;
+            };
+            let came_by = self.map.way(edge_before, !reversed_before);
+            match told.passage.exit {
+                None | Some(Exit::On) => report.exits.2 += 1,
+                Some(exit) => {
+                    report.exits.0 += 1;
+                    let binary = if let Exit::Bearing(binary) = exit { binary } else { 0 };
+                    let bearing_rad = f64::from(binary) / 256.0 * TAU;
+                    let off_rad =
+                        |way: &super::TrueWay| wrapped(way.bearing_rad - came_by.bearing_rad - bearing_rad).abs();
+                    let ways = self.map.ways(self.visits[*before].node);
+                    let taken = ways.iter().min_by(|one, other| off_rad(one).total_cmp(&off_rad(other)));
+                    report.exits.1 += usize::from(taken.is_none_or(|taken| taken.dart() != (edge, is_reversed)));
+                }
+            }
+        }
+        for edge in 0..self.map.edges.len() {
+            let times = [false, true].map(|is_reversed| travels.remove(&(edge, is_reversed)).unwrap_or_default());
+            times.iter().for_each(|times| report.one_way_travel_errors.extend(deviations(times)));
+            report.travel_errors.extend(deviations(&times.concat()));
+        }
+        report
+    }
+
+    fn compare_ways(&self, report: &mut HintReport, node: usize, arrival: (usize, bool), seen: &[f64]) {
+        let came_by = self.map.way(arrival.0, arrival.1);
+        let mut left = seen.to_vec();
+        for way in self.map.ways(node) {
+            if way.dart() == arrival {
+                continue;
+            }
+            report.ways.0 += 1;
+            let error_rad = |bearing_rad: f64| wrapped(bearing_rad - (way.bearing_rad - came_by.bearing_rad));
+            let off_rad = |index: &usize| error_rad(left[*index]).abs();
+            let nearest = (0..left.len()).min_by(|one, other| off_rad(one).total_cmp(&off_rad(other)));
+            match nearest.filter(|nearest| off_rad(nearest) <= SAME_WAY_RAD) {
+                Some(nearest) => report.bearing_errors_rad.push(error_rad(left.swap_remove(nearest))),
+                None => report.ways.1 += 1,
+            }
+        }
+        report.ways.2 += left.len();
+    }
+}
+
+/// The differences of values from their mean, none for a single value.
+fn deviations(values: &[f64]) -> Vec<f64> {
+    let mean = values.iter().sum::<f64>() / values.len().max(1) as f64;
+    if values.len() < 2 { Vec::new() } else { values.iter().map(|value| value - mean).collect() }
+}
