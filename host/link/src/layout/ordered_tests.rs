@@ -45,8 +45,11 @@ fn grown(vertices: u8, rng: &mut Xoshiro256PlusPlus) -> Vec<TopologicalMap> {
                 0 => break,
                 count => (open[rng.random_range(0..count)], open[rng.random_range(0..count)]),
             };
-            if a != b && darts.share_face(a, b) && open.len() > 3 {
+            if open.len() > 3 {
                 darts.join(a, b);
+                if darts.genus() > 0 {
+                    darts.part(a);
+                }
             }
         }
         assert_eq!(darts.genus(), 0);
