@@ -261,7 +261,6 @@ impl<const N: usize, const V: usize, const D: usize, const T: usize> OrderedFilt
         self.publish();
         Some(self.draft.score())
     }
-
 }
 
 /// Vertices keep their ids from update to update as long as most of their visits stay together.
