@@ -29,6 +29,7 @@ mod planar;
 pub mod prior;
 pub mod range_csv;
 pub mod report;
+pub mod rotation_system;
 pub mod run;
 pub mod score;
 pub mod settings;

@@ -20,17 +20,20 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
+use toposlam::persist::Persist;
 use toposlam::place::Place;
 use toposlam::reference::{self, VERTICES, paper};
 use toposlam::ring::{RingFrame, RingGeometry};
 use toposlam::{ConfigError, FaultCounters, Filter, Map, Mapper, MapperConfig, Passage, Update};
 
+use toposlam::wire::FilterSettings;
 use toposlam_sim::Step;
 use toposlam_sim::exploration::Exploration;
 use toposlam_sim::world::{Told, TrueMap};
 
 use crate::ancestry::Ancestry;
 use crate::graph::Graph;
+use crate::rotation_system::RotationSystem;
 use crate::range_csv::{Ring, SONARS_MAX};
 use crate::score::{MapScore, score_map};
 
@@ -201,10 +204,20 @@ pub fn score_path<const V: usize>(
     score_map(&map, &path, &truth, &classes)
 }
 
-/// Scores the best map of a robot.
-pub fn score_exploration(exploration: &Exploration<'_>) -> MapScore {
-    let map = exploration.robot().mapper().map();
-    score_path(map, &exploration.path(), exploration.rover().true_map(), exploration.nodes())
+/// Scores the best map of a robot. A map with ways is exact if it has the driven edges in the order of the ways of the true map,
+/// parallel edges and loops included, up to a symmetry of the building.
+pub fn score_exploration<const V: usize, F>(exploration: &Exploration<'_, V, F>) -> MapScore
+where
+    F: Filter<V, Config: FilterSettings> + Persist,
+{
+    let mapper = exploration.robot().mapper();
+    let truth = exploration.rover().true_map();
+    let score = score_path(mapper.map(), &exploration.path(), truth, exploration.nodes());
+    let Some(darts) = mapper.filter().darts() else { return score };
+    let mut is_driven = vec![false; truth.edges.len()];
+    exploration.ground_truth().driven().into_iter().flatten().for_each(|(edge, _)| is_driven[edge] = true);
+    let exact = RotationSystem::of_map(darts).is_isomorphic_to(&RotationSystem::of_truth(truth, &is_driven));
+    MapScore { exact, isomorphic: exact, ..score }
 }
 
 fn started<const SONARS: usize, F: Filter<VERTICES>>(

@@ -73,6 +73,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
         return hardship::run(&arguments.drive, emulation(arguments, "robot")?, arguments.places, rates);
     }
     match arguments.filter {
+        FilterArgument::Ordered => anyhow::bail!("not yet"),
         FilterArgument::Robust => compare_with::<{ robust::VERTICES }, robust::Filter>(
             arguments,
             emulation(arguments, "robot")?,

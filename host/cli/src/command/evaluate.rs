@@ -304,6 +304,7 @@ impl FilterArguments {
             return Ok(vec![self.robust(), self.paper()]);
         }
         let (filter, other, foreign) = match self.filter {
+            FilterArgument::Ordered => unimplemented!(),
             FilterArgument::Robust => (self.robust(), "paper", of_paper),
             FilterArgument::Paper => (self.paper(), "robust", of_robust),
         };

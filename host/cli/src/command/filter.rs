@@ -6,6 +6,8 @@ use toposlam_eval::mapping::FilterChoice;
 /// Which filter makes the map.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub(super) enum FilterArgument {
+    /// Ordered filter.
+    Ordered,
     /// Robust filter, as in the firmware.
     Robust,
     /// Filter of the paper.
@@ -15,7 +17,7 @@ pub(super) enum FilterArgument {
 impl From<FilterArgument> for FilterChoice {
     fn from(argument: FilterArgument) -> Self {
         match argument {
-            FilterArgument::Robust => Self::Robust,
+            FilterArgument::Ordered | FilterArgument::Robust => Self::Robust,
             FilterArgument::Paper => Self::Paper,
         }
     }
