@@ -288,9 +288,13 @@ impl LocalPlanner {
         if self.is_timed_out() {
             return self.give_up(scan);
         }
-        // An exit that this frame does not show is where the rotation of the ring brings it.
-        let expected_mrad = rotated(self.target_mrad, self.rotation_mrad);
-        let seen = scan.openings(obstacles).nearest(expected_mrad, SAME_OPENING_MRAD);
+        // An exit that this frame does not show is where the rotation of the ring brings it. The robot turns towards the exit.
+        let towards_mrad = if self.target_mrad < 0 { self.rotation_mrad.max(0) } else { self.rotation_mrad.min(0) };
+        let expected_mrad = rotated(self.target_mrad, towards_mrad);
+        let openings = scan.openings(obstacles);
+        // At a dead end there is no other opening.
+        let within_mrad = if openings.count() == 1 { HALF_TURN_MRAD as u16 } else { SAME_OPENING_MRAD };
+        let seen = openings.nearest(expected_mrad, within_mrad);
         let target_mrad = seen.map_or(expected_mrad, |(_, target_mrad)| target_mrad);
         // Straight behind, noise must not reverse the direction of the turn.
         let is_behind = turn_mrad(HALF_TURN_MRAD, target_mrad).abs() < i32::from(SAME_OPENING_MRAD);

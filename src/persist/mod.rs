@@ -3,7 +3,6 @@
 //! This module depends on the stages whose state it saves; no stage depends on this module.
 
 mod mapper;
-mod ordered_stub;
 mod paper_filter;
 mod robust_filter;
 pub mod snapshot;
