@@ -156,9 +156,9 @@ pub use config_error::ConfigError;
 pub use fault::{FaultCounters, FaultKind};
 pub use filter::{
     Consistency, Direction, Evidence, Exit, Filter, FilterCapacities, History, Ngram, NgramError, NgramLength,
-    NgramTable, NgramsFull, Observation, OrderedConfig, OrderedFactors, OrderedFilter, PaperConfig,
-    PaperFactors, PaperFilter, Particle, Passage, Prior, RobustConfig, RobustFactors, RobustFilter, Update, WAYS_MAX,
-    Ways, WaysError, WeightFactors, WorstNgram,
+    NgramTable, NgramsFull, Observation, OrderedConfig, OrderedFactors, OrderedFilter, PaperConfig, PaperFactors,
+    PaperFilter, Particle, Passage, Prior, RobustConfig, RobustFactors, RobustFilter, Update, WAYS_MAX, Ways,
+    WaysError, WeightFactors, WorstNgram,
 };
 pub use map::darts::{Bearing, DartMap, WAYS};
 pub use map::{DartId, Darts, Map, PerVertex, VertexId, VertexSet, VerticesFull};

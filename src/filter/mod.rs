@@ -2,12 +2,12 @@
 
 mod interface;
 mod observation;
-mod ordered;
+pub(crate) mod ordered;
 mod paper;
 pub(crate) mod robust;
 mod vertex_ids;
 mod ways;
-mod worst_ngram;
+pub(crate) mod worst_ngram;
 
 pub use interface::{Filter, FilterCapacities};
 pub use observation::{Observation, Passage};

@@ -91,7 +91,9 @@ impl<const V: usize> VertexIds<V> {
             }
         }
         let idle_ids = || VertexId::first(before.min(vertices)).filter(|&id| !busy.contains(id));
-        while let Some((vertex, id)) = nearest(&ids, map, vertices, visited, idle_ids().filter(|&id| !taken.contains(id)), &label) {
+        while let Some((vertex, id)) =
+            nearest(&ids, map, vertices, visited, idle_ids().filter(|&id| !taken.contains(id)), &label)
+        {
             ids[vertex] = Some(id);
             taken.insert(id);
         }

@@ -91,6 +91,50 @@ impl<const V: usize, const D: usize> DartMap<V, D> {
         self.dart.iter_mut().take(self.darts.into()).for_each(|dart| dart.vertex = number(dart.vertex));
     }
 
+    /// The fields of a way as they are in a snapshot: its partner, bearing, visits, timed passages and travel time.
+    #[cfg(feature = "snapshot")]
+    pub(crate) fn fields(&self, dart: u8) -> (u8, Bearing, u8, u8, u16) {
+        let Dart { partner, bearing, seen, timed, ln_travel, .. } = self.get(dart);
+        (partner, bearing, seen, timed, ln_travel)
+    }
+
+    /// Starts a map of `darts` ways from the fields of a snapshot: [`DartMap::append_way`] follows for each of them.
+    #[cfg(feature = "snapshot")]
+    pub(crate) fn start_with(&mut self, darts: u8) {
+        self.clear();
+        self.darts = darts;
+        self.dart.fill(Dart::NONE);
+    }
+
+    /// Appends a way with its number and fields to the ways of a vertex; `None` when the number is taken or there is no room.
+    #[cfg(feature = "snapshot")]
+    pub(crate) fn append_way(
+        &mut self,
+        vertex: u8,
+        dart: u8,
+        (partner, bearing, seen, timed, ln_travel): (u8, Bearing, u8, u8, u16),
+    ) -> Option<()> {
+        let ways = self.ways.get_mut(usize::from(vertex))?;
+        let way = ways.darts.get_mut(usize::from(ways.count))?;
+        let slot = self.dart.get_mut(usize::from(dart)).filter(|slot| dart < self.darts && slot.vertex == NONE)?;
+        *slot = Dart { vertex, partner, bearing, seen, timed, ln_travel };
+        *way = dart;
+        ways.count += 1;
+        Some(())
+    }
+
+    /// Whether every way has a vertex, the ways of every vertex are in order, and two ways that an edge joins name each other.
+    #[cfg(feature = "snapshot")]
+    pub(crate) fn is_consistent(&self) -> bool {
+        let is_joined = |dart: u8| match self.get(dart) {
+            Dart { vertex: NONE, .. } => false,
+            Dart { partner: NONE, .. } => true,
+            Dart { partner, .. } => partner != dart && self.get(partner).partner == dart,
+        };
+        let in_order = |vertex| self.ways(vertex).is_sorted_by_key(|&way| self.bearing(way));
+        (0..self.darts).all(is_joined) && (0..self.vertices).all(in_order)
+    }
+
     /// Read access with typed numbers.
     pub fn view(&self) -> Darts<'_> {
         Darts::new(
@@ -358,8 +402,9 @@ impl<const V: usize, const D: usize> DartMap<V, D> {
         self.sort_ways(vertex);
     }
 
-    /// Counts a passage of the edge of a dart with a travel time.
-    pub(crate) fn time(&mut self, dart: u8, ln_travel: u16) {
+    /// Counts a passage of the edge of a dart with a travel time, as a natural logarithm of ring frames in
+    /// units of 2⁻¹².
+    pub fn time(&mut self, dart: u8, ln_travel: u16) {
         let holder = self.holder(dart);
         let Some(slot) = self.dart.get_mut(usize::from(holder)) else { return };
         slot.timed = slot.timed.saturating_add(1);

@@ -3,6 +3,7 @@
 //! This module depends on the stages whose state it saves; no stage depends on this module.
 
 mod mapper;
+mod ordered_filter;
 mod paper_filter;
 mod robust_filter;
 pub mod snapshot;

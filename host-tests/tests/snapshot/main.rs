@@ -5,6 +5,7 @@ mod bad_bytes;
 mod common;
 mod exact;
 mod mapper;
+mod ordered;
 mod paper;
 mod specification;
 

@@ -1,6 +1,7 @@
 //! Streams that are split, cut, corrupted or mixed with foreign bytes, at every offset.
 
 use super::samples::{largest, typical};
+use super::streams::impossible_ways;
 use super::{Decoded, decode, frame};
 use proptest::prelude::*;
 use toposlam::wire::{Decoder, Encoder, FRAME_VERSION, MAX_FRAME_BYTES, Message};
@@ -152,6 +153,22 @@ fn every_kind_of_damage_has_its_counter() {
     assert_eq!((counters.unknown_version, counters.unknown_message), (1, 2));
     assert_eq!((counters.messages, counters.lost), (2, 0), "an unknown message is not lost");
     assert_eq!((decoded.messages.len(), decoded.errors), (2, 6));
+}
+
+#[test]
+fn ways_that_no_map_has_are_refused_and_counted() {
+    let frames = impossible_ways();
+    let (possible, impossible) = frames.split_last().expect("there are frames");
+    let mut decoder = Decoder::new();
+    let mut decoded = Decoded::default();
+    for (frame, refused) in impossible.iter().zip(1..) {
+        decoded.decode(&mut decoder, frame);
+        assert_eq!(decoder.counters().unknown_message, refused);
+    }
+    assert_eq!(decoded.messages, []);
+    decoded.decode(&mut decoder, possible);
+    assert!(matches!(decoded.messages[..], [(_, Message::Ways(_))]), "{decoded:?}");
+    assert_eq!(decoder.counters().lost, 0, "a refused message is not lost");
 }
 
 proptest! {

@@ -16,7 +16,9 @@ use toposlam_sim::exploration::Exploration;
 use toposlam_sim::world::{Plan, RobotModel};
 
 use super::samples::{extreme_requests, extremes, largest, largest_requests, requests, typical};
-use super::streams::{Draw, damage, every_damage, foreign_payloads, long_lists, lossy, renamed, restarted, wrapping};
+use super::streams::{
+    Draw, damage, every_damage, foreign_payloads, impossible_ways, long_lists, lossy, renamed, restarted, wrapping,
+};
 use super::{decode, frame};
 
 const FILE: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/golden/stream.jsonl");
@@ -62,6 +64,7 @@ fn records(exploration: &[Vec<u8>]) -> Vec<Value> {
     records.push(stream("one of every kind of damage", &every_damage()));
     records.push(stream("numbers that wrap", &wrapping()));
     records.push(stream("lists that are too long", &long_lists()));
+    records.push(stream("ways that no map has", &impossible_ways().concat()));
     let renamed = renamed();
     records.push(stream("a map that shrinks and is renamed", &renamed.concat()));
     records.push(stream("two vertices become one", &renamed[..15].concat()));
@@ -137,6 +140,8 @@ fn replica_json(replica: &MapReplica<64>) -> Value {
         "vertices": replica.vertices(),
         "rows": (0..replica.vertices()).map(|vertex| replica.row(vertex)).collect::<Vec<_>>(),
         "edges": replica.edges().collect::<Vec<_>>(),
+        "ways": (0..replica.vertices()).map(|vertex| replica.ways(vertex)).collect::<Vec<_>>(),
+        "frontiers": replica.frontiers().collect::<Vec<_>>(),
         "is_converged": replica.is_converged(),
         "is_complete": replica.is_complete(),
         "hello": replica.hello(),
@@ -146,6 +151,7 @@ fn replica_json(replica: &MapReplica<64>) -> Value {
         "belief": replica.belief(),
         "worst": replica.worst(),
         "goal_status": replica.goal_status(),
+        "exploration": replica.exploration(),
         "faults": FaultKind::ALL.map(|kind| replica.fault(kind)),
     })
 }

@@ -3,8 +3,8 @@
 use super::{frame, vertex};
 use toposlam::wire::{Capacities, Encoder, Hello, Message, QueueFull, Reporter, ResetCause};
 use toposlam::{
-    ConfigError, FaultCounters, FaultKind, Filter, FilterCapacities, Fingerprint, Map, Observation, RobustFactors,
-    Update, VertexId, WeightFactors, WorstNgram,
+    ConfigError, DartMap, Darts, FaultCounters, FaultKind, Filter, FilterCapacities, Fingerprint, Map, Observation,
+    RobustFactors, Update, VertexId, WeightFactors, WorstNgram,
 };
 
 pub(crate) const TICKS_PER_HELLO: u16 = 20;
@@ -30,6 +30,8 @@ impl Random {
 #[derive(Clone)]
 pub(crate) struct Believer<const V: usize> {
     pub(crate) map: Map<V>,
+    /// The ways of the same vertices, of a filter that knows them.
+    pub(crate) darts: Option<DartMap<V, 250>>,
     /// For each vertex id before the update, the id after it.
     pub(crate) names: Vec<Option<VertexId>>,
     pub(crate) location: VertexId,
@@ -42,6 +44,7 @@ impl<const V: usize> Filter<V> for Believer<V> {
 
     const UNSTARTED: Self = Self {
         map: Map::new(),
+        darts: None,
         names: Vec::new(),
         location: VertexId::FIRST,
         worst: WorstNgram::NONE,
@@ -66,6 +69,10 @@ impl<const V: usize> Filter<V> for Believer<V> {
 
     fn map(&self) -> &Map<V> {
         &self.map
+    }
+
+    fn darts(&self) -> Option<Darts<'_>> {
+        self.darts.as_ref().map(DartMap::view)
     }
 
     fn faults(&self) -> &FaultCounters {
@@ -110,6 +117,12 @@ pub(crate) struct Robot<const V: usize> {
 }
 
 impl<const V: usize> Robot<V> {
+    /// The number of ticks in one round of the repeated map.
+    pub(crate) fn round(&self) -> usize {
+        let vertices = self.filter.map.vertices().len();
+        5 + if self.filter.darts.is_some() { 2 * vertices } else { vertices }
+    }
+
     pub(crate) fn new(boot: u32) -> Self {
         let capacities = Capacities {
             vertices: V as u8,
@@ -131,6 +144,55 @@ impl<const V: usize> Robot<V> {
         }
     }
 
+    /// The same robot with a filter that knows the ways.
+    pub(crate) fn with_ways(mut self) -> Self {
+        self.filter.darts = Some(DartMap::EMPTY);
+        self
+    }
+
+    /// Adds up to three ways, edges between frontiers, loops included, and travel times.
+    fn add_ways(&mut self, random: &mut Random) {
+        let Some(darts) = &mut self.filter.darts else { return };
+        while usize::from(darts.vertices()) < self.filter.map.vertices().len() {
+            darts.add_vertex().expect("there is room");
+        }
+        for _ in 0..random.below(4) {
+            // A vertex has room for seven ways.
+            let _ = darts.add_way(random.vertex(darts.vertices().into()).into(), random.below(1 << 16) as u16);
+        }
+        for _ in 0..random.below(3) {
+            let frontiers: Vec<u8> = darts.frontiers().collect();
+            if !frontiers.is_empty() {
+                darts.join(frontiers[random.below(frontiers.len())], frontiers[random.below(frontiers.len())]);
+            }
+            let edges: Vec<(u8, u8)> = darts.edges().collect();
+            if !edges.is_empty() {
+                darts.time(edges[random.below(edges.len())].0, random.below(1 << 16) as u16);
+            }
+        }
+    }
+
+    /// The ways of a map whose vertices were renumbered. Merged vertices keep the ways of all of them.
+    fn rename_ways(&mut self, random: &mut Random) {
+        let Some(darts) = &mut self.filter.darts else { return };
+        let before = std::mem::replace(darts, DartMap::EMPTY);
+        for _ in self.filter.map.vertices() {
+            darts.add_vertex().expect("there is room");
+        }
+        let mut now = Vec::new();
+        for dart in before.view().darts() {
+            let vertex = before.view().vertex(dart).and_then(|vertex| self.filter.names[vertex.index()]);
+            let way = vertex.and_then(|vertex| darts.add_way(vertex.into(), before.bearing(dart.into())));
+            now.push(way.filter(|_| !random.happens(5)));
+        }
+        for (a, b) in before.edges() {
+            if let (Some(a), Some(b)) = (now[usize::from(a)], now[usize::from(b)]) {
+                darts.join(a, b);
+                darts.time(a, 20_000);
+            }
+        }
+    }
+
     /// Changes the map as one place does: a new or known vertex, one new edge, one more visit.
     pub(crate) fn drive(&mut self, random: &mut Random) {
         let Believer { map, location, names, .. } = &mut self.filter;
@@ -147,6 +209,7 @@ impl<const V: usize> Robot<V> {
         if known > 0 {
             map.add_edge(from, *location);
         }
+        self.add_ways(random);
         self.set_random_worst(random);
     }
 
@@ -164,6 +227,10 @@ impl<const V: usize> Robot<V> {
             map.add_edge(random.vertex(vertices), random.vertex(vertices));
         }
         *location = random.vertex(vertices);
+        if let Some(darts) = &mut self.filter.darts {
+            darts.clear();
+        }
+        (0..20).for_each(|_| self.add_ways(random));
         self.set_random_worst(random);
     }
 
@@ -202,6 +269,8 @@ impl<const V: usize> Robot<V> {
         let vertices = map.vertices().len();
         map.add_edge(random.vertex(vertices), random.vertex(vertices));
         *location = names.get(location.index()).copied().flatten().unwrap_or(VertexId::FIRST);
+        self.rename_ways(random);
+        self.add_ways(random);
         self.set_random_worst(random);
     }
 
@@ -241,7 +310,7 @@ impl<const V: usize> Robot<V> {
         let Self { filter, reporter, encoder, refused_percent, .. } = self;
         reporter
             .update(filter, &update, |message| queue(encoder, message, random.happens(*refused_percent), &mut frames));
-        assert!(frames.len() <= 2 * V + 6, "{} frames in one update", frames.len());
+        assert!(frames.len() <= 3 * V + 6, "{} frames in one update", frames.len());
         frames
     }
 
@@ -249,10 +318,8 @@ impl<const V: usize> Robot<V> {
     pub(crate) fn tick(&mut self, random: &mut Random) -> Vec<Vec<u8>> {
         let mut frames = Vec::new();
         let Self { filter, faults, reporter, encoder, refused_percent, .. } = self;
-        reporter.tick(&filter.map, faults, |message| {
-            queue(encoder, message, random.happens(*refused_percent), &mut frames)
-        });
-        assert!(frames.len() <= FaultKind::ALL.len() + 5);
+        reporter.tick(filter, faults, |message| queue(encoder, message, random.happens(*refused_percent), &mut frames));
+        assert!(frames.len() <= FaultKind::ALL.len() + 6);
         frames
     }
 }

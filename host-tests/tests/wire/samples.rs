@@ -3,9 +3,9 @@
 use toposlam::Fingerprint;
 use toposlam::ring::Echo;
 use toposlam::wire::{
-    Belief, CHUNK_BYTES, Capacities, Chunk, Command, Echoes, Evidence, Factors, GoalState, GoalStatus, Health, Hello,
-    Info, List, Location, Message, Outcome, Refusal, Remapped, Reply, Request, ResetCause, Row, Setting, Velocity,
-    Version, VertexProbability, Worst,
+    Belief, CHUNK_BYTES, Capacities, Chunk, Command, Echoes, Evidence, Exploration, Factors, GoalState, GoalStatus,
+    Health, Hello, Info, List, Location, Message, Outcome, Refusal, Remapped, Reply, Request, ResetCause, Row, Setting,
+    Velocity, Version, VertexProbability, VertexWays, Way, WayId, Worst,
 };
 
 /// A plausible message of every kind, in the order of their numbers; a reply of every kind.
@@ -30,6 +30,7 @@ pub(crate) fn typical() -> Vec<Message> {
         Message::Location(Location { place_index: 42, vertex: 3 }),
         evidence(Factors::Robust { ln_labels_q16: -13_107, ln_moves_q16: -42_000, ln_size_q16: -829_000 }),
         evidence(Factors::Paper { ln_label_q16: -13_107, ln_consistency_q16: -42_000, ln_size_q16: -829_000 }),
+        evidence(Factors::Ordered { ln_labels_q16: -13_107, ln_moves_q16: -829_000 }),
         Message::Row(Row { vertex: 3, radius_mm: 1172, visits: 12, neighbours: 0b1010_0010 }),
         Message::Fault { kind: 2, count: 5 },
         Message::Health(Health {
@@ -67,7 +68,25 @@ pub(crate) fn typical() -> Vec<Message> {
         reply(Outcome::Refused(Refusal::UnknownVertex)),
         Message::Velocity(Velocity { frame_index: 5310, heading_mrad: -250, speed_permille: 700, state: 2 }),
         Message::GoalStatus(GoalStatus { vertex: 3, state: GoalState::Active }),
+        Message::Ways(VertexWays {
+            vertex: 3,
+            ways: List::new([
+                edge(80, (7, 2), Some(54)),
+                edge(1650, (3, 2), None),
+                edge(3220, (3, 1), None),
+                frontier(4790),
+            ]),
+        }),
+        Message::Exploration(Exploration { frontiers: 5, complete: false }),
     ]
+}
+
+fn frontier(bearing_mrad: u16) -> Way {
+    Way { bearing_mrad, leads_to: None, travel_frames: None }
+}
+
+fn edge(bearing_mrad: u16, (vertex, way): (u8, u8), travel_frames: Option<u16>) -> Way {
+    Way { bearing_mrad, leads_to: Some(WayId { vertex, way }), travel_frames }
 }
 
 fn evidence(factors: Factors) -> Message {
@@ -175,6 +194,7 @@ pub(crate) fn largest() -> Vec<Message> {
             ln_consistency_q16: i32::MIN,
             ln_size_q16: i32::MIN,
         }),
+        largest_evidence(Factors::Ordered { ln_labels_q16: i32::MIN, ln_moves_q16: i32::MIN }),
         Message::Row(Row { vertex: BYTE, radius_mm: SHORT, visits: WORD, neighbours: !0 }),
         Message::Fault { kind: BYTE, count: WORD },
         Message::Health(Health {
@@ -217,6 +237,8 @@ pub(crate) fn largest() -> Vec<Message> {
             state: BYTE,
         }),
         Message::GoalStatus(GoalStatus { vertex: BYTE, state: GoalState::Replaced }),
+        Message::Ways(VertexWays { vertex: 63, ways: List::new([edge(6282, (62, 6), Some(SHORT)); 7]) }),
+        Message::Exploration(Exploration { frontiers: BYTE, complete: true }),
     ]
 }
 
@@ -237,7 +259,7 @@ fn largest_reply(outcome: Outcome) -> Message {
 /// Empty lists, the minimum of unsigned numbers, the other extreme of signed ones, and every one-byte enum variant.
 pub(crate) fn extremes() -> Vec<Message> {
     let reply = |outcome| Message::Reply(Reply { request: 0, outcome });
-    let evidence = |place_index, logarithm| {
+    let robust = |place_index, logarithm| {
         Message::Evidence(Evidence {
             place_index,
             consistency_mm: 0,
@@ -267,9 +289,9 @@ pub(crate) fn extremes() -> Vec<Message> {
         Message::Place { place_index: 0x7F, frame_index: 0x80, radius_mm: 0x3FFF, degree: Some(0) },
         Message::Map { vertices: 0, edges: 0, digest: 0 },
         Message::Edge { a: 0, b: 0, present: false },
-        evidence(0, 0),
-        evidence(0x1F_FFFF, i32::MAX),
-        evidence(0x0FFF_FFFF, -1),
+        robust(0, 0),
+        robust(0x1F_FFFF, i32::MAX),
+        robust(0x0FFF_FFFF, -1),
         Message::Health(Default::default()),
         Message::Ring { frame_index: 0, echoes: Echoes::EMPTY },
         Message::Ring { frame_index: 0, echoes: Echoes::new(&ring) },
@@ -281,6 +303,10 @@ pub(crate) fn extremes() -> Vec<Message> {
         drive(1, -1),
         drive(2, 1),
         drive(3, i16::MAX),
+        evidence(Factors::Ordered { ln_labels_q16: 0, ln_moves_q16: 0 }),
+        Message::Ways(VertexWays { vertex: 0, ways: List::new([]) }),
+        Message::Ways(VertexWays { vertex: 0, ways: List::new([edge(0, (0, 1), Some(1)), edge(0, (0, 0), Some(1))]) }),
+        Message::Exploration(Exploration { frontiers: 0, complete: false }),
     ];
     extremes.extend(ResetCause::ALL.iter().map(|&reset_cause| Message::Hello(Hello { reset_cause, ..hello })));
     extremes.extend(Refusal::ALL.iter().map(|&refusal| reply(Outcome::Refused(refusal))));

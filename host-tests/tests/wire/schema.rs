@@ -45,6 +45,8 @@ fn the_samples_cover_every_message_in_the_order_of_numbers() {
         "Reply",
         "Velocity",
         "GoalStatus",
+        "Ways",
+        "Exploration",
     ];
     let mut described: Vec<_> = typical().iter().map(describe).collect();
     described.dedup_by_key(|line| line.split(' ').next().map(str::to_owned));
@@ -187,7 +189,6 @@ impl ser::Serializer for Describer {
     never! {
         serialize_str(&str) -> Described,
         serialize_bytes(&[u8]) -> Described,
-        serialize_none() -> Described,
         serialize_unit() -> Described,
         serialize_unit_struct(&'static str) -> Described,
         serialize_tuple(usize) -> Result<Self::SerializeTuple, Self::Error>,
@@ -198,6 +199,10 @@ impl ser::Serializer for Describer {
 
     fn serialize_unit_variant(self, _: &'static str, number: u32, name: &'static str) -> Described {
         Ok(format!("{number} {name}"))
+    }
+
+    fn serialize_none(self) -> Described {
+        Ok("Option<_>".to_owned())
     }
 
     fn serialize_some<T: Serialize + ?Sized>(self, value: &T) -> Described {
@@ -245,9 +250,9 @@ impl ser::SerializeSeq for Fields {
         self.element(value)
     }
 
-    /// The elements of a sequence have one type, however many there are.
+    /// The elements of a sequence have one type, however many there are. One without missing values describes it.
     fn end(mut self) -> Described {
-        self.fields.dedup();
+        self.fields = self.fields.into_iter().max_by_key(String::len).into_iter().collect();
         self.describe()
     }
 }

@@ -5,7 +5,7 @@ use super::samples::{extremes, largest, requests, typical};
 use super::{decode, frame};
 use toposlam::wire::{
     Belief, Encoder, FRAME_VERSION, GoalState, GoalStatus, Hello, List, Location, Message, Remapped, ResetCause,
-    VertexProbability, Worst, crc32,
+    VertexProbability, VertexWays, Way, WayId, Worst, crc32,
 };
 
 /// Frames lost, repeated and overtaken.
@@ -81,6 +81,7 @@ pub(crate) fn long_lists() -> Vec<u8> {
         list(&[12, 0], 65, &[1]),
         list(&[13, 0, 0, 0], 8, &[1]),
         list(&[14, 0, 2, 0, 0], 65, &[1]),
+        list(&[17, 0], 8, &[1, 0, 0]),
         with_crc(&[FRAME_VERSION, 0, 0, 12, 0, 0xFF, 0xFF, 0xFF, 0xFF, 0xFF, 0xFF, 0xFF, 0xFF, 0xFF, 1]),
         with_crc(&[FRAME_VERSION, 0, 0, 12, 0, 0xFF, 0xFF, 0xFF, 0xFF, 0xFF, 0xFF, 0xFF, 0xFF, 0xFF, 3]),
         // A varint may have redundant bytes, and must not exceed the range of its type.
@@ -90,6 +91,28 @@ pub(crate) fn long_lists() -> Vec<u8> {
         with_crc(&[FRAME_VERSION, 2, 0, 12, 0x80, 0x80, 0x80, 0x80, 0x80, 0, 0]),
     ]
     .concat()
+}
+
+/// Ways that no map has, each in an intact frame, and one that a map has.
+pub(crate) fn impossible_ways() -> Vec<Vec<u8>> {
+    let ways: [&[u8]; 10] = [
+        &[64, 0],
+        // A bearing of a full turn, and descending bearings.
+        &[0, 1, 0x8B, 0x31, 0, 0],
+        &[0, 2, 5, 0, 0, 4, 0, 0],
+        // Other ends beyond the vertices and ways of any map, and one that is the way itself.
+        &[0, 1, 5, 1, 64, 0, 0],
+        &[0, 1, 5, 1, 1, 7, 0],
+        &[0, 1, 5, 1, 0, 0, 0],
+        // Loops with one end.
+        &[0, 1, 5, 1, 0, 1, 0],
+        &[0, 2, 5, 1, 0, 1, 0, 6, 0, 0],
+        // A travel time of a frontier, and one of 0.
+        &[0, 1, 5, 0, 1, 9],
+        &[0, 1, 5, 1, 1, 0, 1, 0],
+    ];
+    let ways = ways.into_iter().chain([&[0, 2, 5, 1, 0, 1, 0, 6, 1, 0, 0, 0][..]]);
+    (0..).zip(ways).map(|(sequence, ways)| with_crc(&[&[FRAME_VERSION, sequence, 0, 17], ways].concat())).collect()
 }
 
 /// The frames of a small map whose vertex ids change repeatedly.
@@ -129,6 +152,41 @@ pub(crate) fn renamed() -> Vec<Vec<u8>> {
         names(&[64, 1, 2, 63]),
         names(&[200]),
     ];
+    let ways = |vertex, ends: &[Option<(u8, u8)>]| {
+        let way = |(bearing_mrad, end): (u16, &Option<(u8, u8)>)| Way {
+            bearing_mrad,
+            leads_to: end.map(|(vertex, way)| WayId { vertex, way }),
+            travel_frames: end.map(|(_, way)| 40 + u16::from(way)),
+        };
+        Message::Ways(VertexWays { vertex, ways: List::new((0..).zip(ends).map(way)) })
+    };
+    // Two parallel edges, a loop and a frontier; the digest covers them.
+    let (two, loops) = ([Some((1, 1)), Some((1, 0)), None], [Some((0, 1)), Some((0, 0)), Some((1, 3)), Some((1, 2))]);
+    let bytes = |ends: &[Option<(u8, u8)>]| {
+        let way = |(bearing, end): (u8, &Option<(u8, u8)>)| match end {
+            Some((vertex, way)) => [bearing, 0, *vertex, *way, 40 + way, 0],
+            None => [bearing, 0, 255, 255, 0, 0],
+        };
+        [vec![ends.len() as u8], (0..).zip(ends).flat_map(way).collect()].concat()
+    };
+    let canonical = [&canonical.concat()[..], &bytes(&two), &bytes(&loops)].concat();
+    let with_ways = [
+        names(&[255, 255, 255, 255, 255]),
+        vertex(0),
+        vertex(1),
+        Message::Edge { a: 0, b: 1, present: true },
+        ways(0, &two),
+        ways(1, &loops),
+        Message::Map { vertices: 2, edges: 1, digest: crc32(&canonical) },
+        names(&[1, 0]),
+        names(&[1, 0]),
+        ways(5, &[Some((0, 2))]),
+        Message::Map { vertices: 1, edges: 0, digest: 0 },
+        ways(1, &loops),
+        names(&[0, 0]),
+        names(&[255]),
+    ];
+    let messages: Vec<Message> = messages.into_iter().chain(with_ways).collect();
     let mut encoder = Encoder::new(0);
     messages.iter().map(|message| frame(&mut encoder, message)).collect()
 }

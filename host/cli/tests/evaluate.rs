@@ -45,6 +45,7 @@ fn json_file(file: &Path) -> Value {
 const SURROGATE: &str = "environments/wean-surrogate-sd.toml";
 const TABLE_I: &str = "environments/table-i.toml";
 const PLACEMENTS: &str = "1,2,environments/wean-surrogate-sd.toml";
+const NOISY_WAYS: &str = "ways,travel=0.1,missing=0.05,wrong=0.04,missed=0.05,bearing_mrad=100";
 const FAMILY: &str = "1,3,8,10,2-3,4,0.03,right-resolving";
 
 #[test]
@@ -71,7 +72,7 @@ fn the_report_has_the_documented_keys_and_shares_between_0_and_1() {
         let course = ["--paths", "4", "--lengths", "10,20", "--hypotheses", "4", "--filter", filter];
         let report = report(&[cases.as_slice(), &course].concat(), "2");
         let settings = json!({
-            "seed": 1, "prior": "none", "hints": "none", "fingerprint_bits": 12, "ngram_length": 5,
+            "seed": 1, "walk": "uniform", "prior": "none", "hints": "none", "bearings": "spread", "fingerprint_bits": 12, "ngram_length": 5,
             "refinement_steps": 10, "prior_refinement_steps": 10, "search_from_truth": 0,
             "filters": { filter: parameters },
         });
@@ -140,8 +141,14 @@ fn check_row(row: &Value, filter: &str) {
 
 #[test]
 fn the_same_seed_gives_the_same_report_on_any_number_of_threads() {
-    for filter in ["robust", "paper"] {
-        for prior in ["path", "exploration", "none"] {
+    let (both, all) = ("both,missing=0.2,wrong=0.1", &["path", "exploration", "none"][..]);
+    for (filter, hints, priors) in [
+        ("robust", both, all),
+        ("paper", both, all),
+        ("ordered", NOISY_WAYS, &["path", "none"]),
+        ("robust", NOISY_WAYS, &["none"]),
+    ] {
+        for prior in priors {
             let course = [
                 "--environment",
                 SURROGATE,
@@ -156,7 +163,7 @@ fn the_same_seed_gives_the_same_report_on_any_number_of_threads() {
                 "--prior-refinement-steps",
                 "0",
             ];
-            let more = ["--filter", filter, "--prior", prior, "--hints", "both,missing=0.2,wrong=0.1"];
+            let more = ["--filter", filter, "--prior", prior, "--hints", hints];
             let run = |seed, threads| report(&[&course, more.as_slice(), &["--seed", seed]].concat(), threads);
             let first = run("7", "1");
             assert_eq!(first, run("7", "3"), "{filter} {prior}");
@@ -207,10 +214,9 @@ fn the_table_shows_the_seed_and_names_every_row() {
     let table = String::from_utf8(output.stdout).unwrap();
     let lines: Vec<&str> = table.lines().collect();
     assert_eq!(lines.len(), 6);
-    assert!(
-        lines[0]
-            .starts_with("seed 5, prior none, hints none, 12 bits, n = 5, 10 refinement steps; robust: hypotheses 10")
-    );
+    assert!(lines[0].starts_with(
+        "seed 5, walk uniform, prior none, hints none, 12 bits, n = 5, 10 refinement steps; robust: hypotheses 10"
+    ));
     assert!(lines[1].starts_with("name "));
     assert!(lines[2].starts_with("table-i ") && lines[3].starts_with("table-i "));
     assert!(lines[5].starts_with(&format!("family {FAMILY} robust")));
@@ -281,6 +287,71 @@ fn check_exported_path(folder: &Path, path: u64) {
     assert_eq!(truth["classes"], truth["truth"]["30"]["classes"]);
 }
 
+/// A file with parallel edges, a loop and a dead end. Place 3 has the label of place 1.
+const MULTIGRAPH: &str = "name = \"multigraph\"\nedges = [[1, 2], [1, 2], [2, 2], [2, 3]]\nlengths_m = [4, 9, 6, 2]\n\
+    [[place]]\nid = 1\nmean_mm = 800\nsd_mm = 20\nways = [0, 1]\n\
+    [[place]]\nid = 2\nmean_mm = 1500\nsd_mm = 20\nways = [1, 0, 3, 2, 2]\n\
+    [[place]]\nid = 3\nmean_mm = 800\nsd_mm = 20\nways = [3]\n";
+
+#[test]
+fn maps_with_loops_and_parallel_edges_are_exact_by_their_ways() {
+    let directory = tempfile::tempdir().unwrap();
+    let file = directory.path().join("multigraph.toml");
+    fs::write(&file, MULTIGRAPH).unwrap();
+    let course = ["--environment", file.to_str().unwrap(), "--paths", "5", "--lengths", "20,100", "--from-truth", "20"];
+    for walk in ["uniform", "forward", "explore"] {
+        let report = report(&[&course[..], &["--hints", NOISY_WAYS, "--walk", walk]].concat(), "2");
+        assert_eq!((&report["settings"]["walk"], &report["settings"]["hints"]), (&json!(walk), &json!(NOISY_WAYS)));
+        assert_eq!(report["settings"]["filters"]["ordered"]["wrong_exit"], json!(0.04));
+        let row = &report["rows"][1];
+        assert_eq!((&row["filter"], &row["paths_not_exhaustive"]), (&json!("ordered"), &json!(0)), "{walk}");
+        for key in ["exact", "isomorphic", "edge_f1"] {
+            assert_eq!(row[key], json!(1.0), "{walk}: {key}");
+        }
+        assert_eq!((&row["vertices"], &row["limit"]), (&json!({ "3": 5 }), &json!(0.0)), "{walk}");
+        assert!(row["location_smoothed"].as_f64().unwrap() > 0.95, "{walk}");
+    }
+}
+
+#[test]
+fn the_ordered_filter_maps_fingerprints_alone_and_a_multigraph_family() {
+    let arguments = ["--environment", TABLE_I, "--paths", "2", "--lengths", "60", "--filter", "ordered"];
+    let row = &report(&arguments, "2")["rows"][0];
+    assert_eq!((&row["filter"], &row["vertices_full"]), (&json!("ordered"), &json!(0)));
+    let family = ["--family", "1,3,8,12,2-3,4,0.03,multigraph", "--paths", "6", "--lengths", "150", "--hints", "ways"];
+    let report = report(&[&family[..], &["--bearings", "right-angles"]].concat(), "2");
+    assert_eq!(report["settings"]["bearings"], json!("right-angles"));
+    assert!(report["rows"][0]["exact"].as_f64().unwrap() > 0.8);
+}
+
+#[test]
+fn exported_paths_contain_the_ways() {
+    let directory = tempfile::tempdir().unwrap();
+    let file = directory.path().join("multigraph.toml");
+    fs::write(&file, MULTIGRAPH).unwrap();
+    let export = directory.path().join("export");
+    let course = ["--environment", file.to_str().unwrap(), "--paths", "1", "--lengths", "30", "--hints", "ways,travel"];
+    report(&[&course[..], &["--export", export.to_str().unwrap()]].concat(), "2");
+    let csv = fs::read_to_string(export.join("multigraph/0.csv")).unwrap();
+    let mut lines = csv.lines();
+    assert_eq!(lines.next(), Some("place,radius_mm,turn,degree,ways_mrad,exit_mrad,travel_frames"));
+    let truth = json_file(&export.join("multigraph/0.truth.json"));
+    assert_eq!(truth["corridors"], json!([[0, 1], [0, 1], [1, 1], [1, 2]]));
+    assert_eq!(truth["ways"], json!([[0, 1], [1, 0, 3, 2, 2], [3]]));
+    for (step, line) in lines.enumerate() {
+        let visit: Vec<&str> = line.split(',').collect();
+        let place = truth["places"][step].as_u64().unwrap() as usize;
+        assert_eq!(visit[3], ["2", "5", "1"][place]);
+        let others: Vec<u32> = visit[4].split_whitespace().map(|bearing| bearing.parse().unwrap()).collect();
+        assert_eq!(others.len(), [1, 4, 0][place]);
+        assert!(others.is_sorted() && others.iter().all(|&bearing| (1..6283).contains(&bearing)));
+        assert_eq!(visit[5].is_empty(), step == 0);
+        assert_eq!(visit[2] == "back", visit[5] == "0");
+        // 4, 9, 6 and 2 m at 0.3 m/s, ten frames a second.
+        assert!(step == 0 || ["133", "300", "200", "67"].contains(&visit[6]), "{line}");
+    }
+}
+
 #[test]
 fn plots_show_both_filters_on_the_same_paths() {
     let directory = tempfile::tempdir().unwrap();
@@ -306,6 +377,15 @@ fn invalid_arguments_are_refused_with_a_reason() {
     let family = refusal(&["--family", "1,1,8,7,2,3,0.03"]);
     assert!(family.contains("--family") && family.contains("V_MAX = 7: must be V_MIN or more"));
     assert!(refusal(&["--family", "1,1,3,3,2,1,0.03"]).contains("no such environment"));
+    let directory = tempfile::tempdir().unwrap();
+    let complete = directory.path().join("complete.toml");
+    let places = (1..=5).map(|id| format!("[[place]]\nid = {id}\nmean_mm = 900\nsd_mm = 9\n")).collect::<String>();
+    let edges = "[[1, 2], [1, 3], [1, 4], [1, 5], [2, 3], [2, 4], [2, 5], [3, 4], [3, 5], [4, 5]]";
+    fs::write(&complete, format!("name = \"complete\"\nedges = {edges}\n{places}")).unwrap();
+    let complete = ["--environment", complete.to_str().unwrap(), "--paths", "1", "--hints"];
+    let not_planar = refusal(&[&complete[..], &["ways"]].concat());
+    assert!(not_planar.contains("complete, ordered filter") && not_planar.contains("cannot be drawn in the plane"));
+    report(&[&complete[..], &["turn"]].concat(), "1");
     assert!(refusal(&[]).contains("--environment"));
     for (arguments, reason) in [
         (
@@ -323,6 +403,12 @@ fn invalid_arguments_are_refused_with_a_reason() {
         (&["--filter", "paper", "--penalty", "1"], "--penalty"),
         (&["--penalty", "0.1"], "--penalty needs --filter paper"),
         (&["--filter", "paper", "--moves", "1"], "--moves needs --filter robust"),
+        (&["--hints", "ways", "--moves", "1"], "--moves needs --filter robust"),
+        (&["--filter", "ordered", "--hypotheses", "20"], "--hypotheses needs --filter robust"),
+        (&["--missed-way", "0.1"], "--missed-way needs --filter ordered"),
+        (&["--hints", "ways", "--wrong-exit", "0.9"], "wrong_exit_permille is 900, but must be"),
+        (&["--hints", "turn,travel"], "travel is a setting of the hints ways"),
+        (&["--walk", "back"], "a walk is uniform, forward or explore, not back"),
         (&["--filter", "paper", "--plot", "nowhere"], "--plot"),
         (&["--length", "0"], "--lengths"),
         (&["--lengths", "50,20"], "--lengths: must be in ascending order"),

@@ -156,7 +156,7 @@ fn explored(buffer: &mut [u8], mut say: impl FnMut(&[u8])) -> Exploration<'_> {
 }
 
 fn map(exploration: &Exploration<'_>) -> TopologicalMap {
-    TopologicalMap::from(exploration.robot().mapper().map())
+    TopologicalMap::of(exploration.robot().mapper().filter())
 }
 
 #[test]

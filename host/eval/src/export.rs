@@ -3,14 +3,16 @@
 
 use super::{
     case::Case,
+    corridors::Corridors,
     environment::Place,
+    rotation::RotationSystem,
     run::Course,
     settings::{EvaluationError, Settings},
     trial::{Trial, Truth},
 };
 use serde::Serialize;
-use std::{collections::BTreeMap, fmt, fs, io, path::Path};
-use toposlam::Exit;
+use std::{collections::BTreeMap, f64::consts::TAU, fmt, fs, io, path::Path};
+use toposlam::{Exit, Observation, Ways};
 
 /// Why paths were not written.
 #[derive(Debug)]
@@ -58,8 +60,14 @@ struct TruthFile<'a> {
     classes: Vec<usize>,
     /// Mean and standard deviation of every place of the environment, in millimetres.
     labels: Vec<[f64; 2]>,
-    /// All edges of the environment.
+    /// All pairs of connected places of the environment.
     edges: Vec<[usize; 2]>,
+    /// All corridors of the environment, if the hints are ways.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    corridors: Option<Vec<[usize; 2]>>,
+    /// The positions in `corridors` of the ways of every place, counter-clockwise.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    ways: Option<Vec<Vec<usize>>>,
     /// The check points.
     lengths: &'a [usize],
     /// The true map at each check point.
@@ -89,7 +97,7 @@ pub fn export(directory: &Path, cases: &[Case], settings: &Settings) -> Result<(
         fs::create_dir_all(&folder).map_err(|error| write_error(&folder, error))?;
         let course = Course::new(case, settings).map_err(ExportError::Evaluation)?;
         for path in 0..settings.paths as u64 {
-            let trial = course.trial(path);
+            let trial = course.trial(path).map_err(ExportError::Evaluation)?;
             write(&folder.join(format!("{path}.csv")), table(&trial))?;
             write(&folder.join(format!("{path}.truth.json")), json(&truth_file(&trial, settings)))?;
         }
@@ -115,34 +123,54 @@ fn slug(name: &str) -> String {
 
 fn table(trial: &Trial) -> io::Result<Vec<u8>> {
     let mut writer = csv::Writer::from_writer(Vec::new());
-    writer.write_record(["place", "radius_mm", "turn", "degree"])?;
+    let with_ways = trial.corridors.is_some();
+    let columns = ["place", "radius_mm", "turn", "degree", "ways_mrad", "exit_mrad", "travel_frames"];
+    writer.write_record(&columns[..if with_ways { 7 } else { 4 }])?;
     for (step, visit) in trial.visits.iter().enumerate() {
-        let observation = visit.observation;
-        let turn = match observation.exit {
-            Some(Exit::Back) => "back",
-            Some(_) => "on",
-            None => "",
-        };
-        let degree = observation.ways.map_or(String::new(), |ways| ways.count().to_string());
-        let radius_mm = observation.fingerprint.radius_mm().to_string();
-        writer.write_record([&step.to_string(), &radius_mm, turn, &degree])?;
+        let Observation { fingerprint, ways, exit, travel_frames, .. } = visit.observation;
+        let turn = exit.map_or("", |exit| if exit.is_back() { "back" } else { "on" });
+        let degree = ways.map_or(String::new(), |ways| ways.count().to_string());
+        let mut record = vec![step.to_string(), fingerprint.radius_mm().to_string(), turn.into(), degree];
+        if with_ways {
+            let others = ways.as_ref().and_then(Ways::others).unwrap_or(&[]);
+            record.push(others.iter().map(|&bearing| mrad(bearing)).collect::<Vec<_>>().join(" "));
+            record.push(match exit {
+                None | Some(Exit::On) => String::new(),
+                Some(Exit::Back) => mrad(0),
+                Some(Exit::Bearing(bearing)) => mrad(bearing),
+            });
+            record.push(travel_frames.map_or(String::new(), |frames| frames.to_string()));
+        }
+        writer.write_record(&record)?;
     }
     writer.into_inner().map_err(|error| error.into_error())
+}
+
+/// A bearing in 1/256 of a turn, in milliradians.
+fn mrad(bearing: u8) -> String {
+    (f64::from(bearing) * 1000.0 * TAU / 256.0).round().to_string()
 }
 
 fn truth_file<'a>(trial: &Trial, settings: &'a Settings) -> TruthFile<'a> {
     let pairs = |edges: &mut dyn Iterator<Item = &(usize, usize)>| edges.map(|&(a, b)| [a, b]).collect();
     let truth_after = |length: usize| {
-        let Truth { graph, classes } = trial.truth(length);
+        let Truth { graph, classes, .. } = trial.truth(length);
         let classes = classes[trial.places_before()..].to_vec();
         TruthGraph { classes, vertices: graph.vertex_count(), edges: pairs(&mut graph.edges().iter()) }
     };
     let label = |place: &Place| [place.mean_mm, place.sd_mm];
+    let rotation = trial.corridors.as_ref().map(Corridors::rotation);
+    let ways = |rotation: &RotationSystem| {
+        let positions = |place| rotation.ways(place).iter().map(|dart| dart / 2).collect();
+        (0..rotation.vertex_count()).map(positions).collect()
+    };
     TruthFile {
         places: trial.visits.iter().map(|visit| visit.place).collect(),
         classes: truth_after(settings.longest()).classes,
         labels: trial.environment.places().iter().map(label).collect(),
         edges: pairs(&mut trial.environment.graph().edges().iter()),
+        corridors: rotation.map(|_| pairs(&mut trial.environment.corridors().iter())),
+        ways: rotation.map(ways),
         lengths: &settings.lengths,
         truth: settings.lengths.iter().map(|&length| (length, truth_after(length))).collect(),
     }

@@ -16,17 +16,16 @@ pub enum Quantity {
     Vertices,
 }
 
-/// The rows of the robust and of the paper's filter for the same case and check point, drawn side by side.
+/// The rows of two filters for the same case and check point, drawn side by side.
 #[derive(Clone, Copy, Debug)]
 pub struct Pair<'a> {
-    /// The row of the robust filter, and that of the paper's filter.
+    /// The rows; the second one is that of the paper's filter.
     pub rows: [&'a Row; 2],
     /// Number of places of the environments, if they all have the same number.
     pub places: Option<usize>,
 }
 
 const COLOURS: [&str; 2] = ["#1f6f8b", "#b3261e"];
-const NAMES: [&str; 2] = ["robust filter", "paper's filter"];
 const INK: &str = "#222222";
 const FAINT: &str = "#dcdcdc";
 const PANEL: (f64, f64) = (420.0, 220.0);
@@ -127,7 +126,8 @@ fn panel(quantity: Quantity, row: &Row, axes: &Axes, places: Option<usize>, side
     let (width, height) = PANEL;
     let bin_width = width / axes.bins.len() as f64;
     let y = |percent: f64| height - height * percent / axes.top_percent as f64;
-    let exact = format!("{}: {:.1} % exact", NAMES[side], 100.0 * row.exact);
+    let filter = if row.filter == "paper" { "paper's" } else { row.filter };
+    let exact = format!("{filter} filter: {:.1} % exact", 100.0 * row.exact);
     let mut panel =
         Group::new().add(words(&exact, 0.0, -14.0, 14.0).set("fill", COLOURS[side]).set("font-weight", "bold"));
     for percent in (0..=axes.top_percent).step_by(share_step(axes.top_percent as f64)) {

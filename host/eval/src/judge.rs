@@ -4,12 +4,12 @@ use super::{
     candidate::{Candidate, Start, VERTICES, prior_table},
     graph::Graph,
     prior::PriorSource,
-    score::{MapScore, is_localised, score_map_from},
+    score::{MapScore, has_the_same_ways, is_localised, score_map_from},
     settings::Settings,
     trial::{Trial, Truth},
 };
 use std::time::{Duration, Instant};
-use toposlam::{Consistency, Direction, Evidence, History, Map, NgramLength, VertexId};
+use toposlam::{Consistency, Direction, Evidence, History, Map, NgramLength};
 
 /// Interval between tests for an exact map, in places; check points are tested, too.
 pub const EXACT_EVERY: usize = 10;
@@ -76,53 +76,59 @@ pub fn judge(trial: &Trial, settings: &Settings, start: Start) -> PathResult {
         let path = candidate.path(before + steps);
         // The remaining check points.
         for (truth, localised) in truths.iter().zip(&mut localised).skip(judgements.len()) {
-            *localised += usize::from(is_localised(&path, &truth.classes[..before + steps]));
+            *localised += usize::from(is_known_and_localised(&path, &truth.classes[..before + steps]));
         }
         let check_point = (settings.lengths.get(judgements.len()) == Some(&steps)).then_some(judgements.len());
         if check_point.is_none() && !steps.is_multiple_of(EXACT_EVERY) {
             continue;
         }
-        let map = candidate.map();
-        let graph = graph_of(&map);
         let truth = trial.truth(steps);
-        let score = score_map_from(&graph, &path, &truth.graph, &truth.classes, before);
+        let score = score(&*candidate, &truth, before);
         exact_from = score.exact.then(|| exact_from.unwrap_or(steps));
         if let Some(check_point) = check_point {
+            let map = candidate.map();
             judgements.push(Judgement {
                 score,
-                vertices: graph.vertex_count(),
+                vertices: map.vertices().len(),
                 localised_share: localised[check_point] as f64 / steps as f64,
                 consistency_mm: distance_mm(&map, steps),
                 exact_from,
-                leaves_truth: leaves_truth(&*candidate, &truth, before, settings.search_from_truth),
+                leaves_truth: leaves_truth(&*candidate, trial, &truth, settings.search_from_truth),
                 filter_time,
             });
         }
     }
     let vertices_full = candidate.vertices_full();
-    PathResult { exhaustive: trial.exhaustive, judgements, vertices_full, prior_time }
+    PathResult { exhaustive: trial.walk.exhaustive, judgements, vertices_full, prior_time }
+}
+
+/// Scores the map of a filter. Places that the filter has forgotten do not count.
+fn score(candidate: &dyn Candidate, truth: &Truth, before: usize) -> MapScore {
+    let path = candidate.path(truth.classes.len());
+    let known = |(&vertex, &class): (&Option<usize>, &usize)| Some((vertex?, class));
+    let first = path.iter().take(before).flatten().count();
+    let (path, classes): (Vec<usize>, Vec<usize>) = path.iter().zip(&truth.classes).filter_map(known).unzip();
+    let score = score_map_from(&graph_of(&candidate.map()), &path, &truth.graph, &classes, first);
+    match (&truth.rotation, candidate.ways()) {
+        (Some(truth), Some(ways)) => MapScore { exact: has_the_same_ways(&ways, &path, truth, &classes), ..score },
+        _ => score,
+    }
+}
+
+/// Whether the last vertex of a path is known and represents the class of the robot, judged only by the path so far.
+fn is_known_and_localised(path: &[Option<usize>], classes: &[usize]) -> bool {
+    let known = path.iter().zip(classes).filter_map(|(&vertex, &class)| Some((vertex?, class)));
+    let (known, classes): (Vec<usize>, Vec<usize>) = known.unzip();
+    path.last().is_some_and(Option::is_some) && is_localised(&known, &classes)
 }
 
 /// Whether a search of `steps` refinement steps from the true path ends in another map.
-fn leaves_truth(candidate: &dyn Candidate, truth: &Truth, before: usize, steps: u32) -> Option<bool> {
+fn leaves_truth(candidate: &dyn Candidate, trial: &Trial, truth: &Truth, steps: u32) -> Option<bool> {
     if steps == 0 {
         return None;
     }
-    // The filter numbers vertices by first visit.
-    let mut seen = Vec::new();
-    let path: Vec<VertexId> = truth
-        .classes
-        .iter()
-        .map(|class| {
-            let number = seen.iter().position(|known| known == class).unwrap_or_else(|| {
-                seen.push(*class);
-                seen.len() - 1
-            });
-            VertexId::new(u8::try_from(number).ok()?)
-        })
-        .collect::<Option<_>>()?;
-    let (map, path) = candidate.search_from(&path, steps)?;
-    Some(!score_map_from(&graph_of(&map), &path, &truth.graph, &truth.classes, before).exact)
+    let found = candidate.search_from(trial, truth, steps)?;
+    Some(!score(&*found, truth, trial.places_before()).exact)
 }
 
 fn graph_of(map: &Map<VERTICES>) -> Graph {
@@ -182,7 +188,7 @@ mod tests {
         candidate::Candidate,
         environment::{Environment, Place},
         settings::Filter,
-        walk::all_walks,
+        walk::{WalkKind, all_walks},
     };
     use toposlam::{Fingerprint, Observation, RobustConfig};
 
@@ -202,17 +208,13 @@ mod tests {
 
         fn refine(&mut self, _steps: u32) {}
 
-        fn search_from(&self, _path: &[VertexId], _steps: u32) -> Option<(Map<VERTICES>, Vec<usize>)> {
-            None
-        }
-
         fn map(&self) -> Map<VERTICES> {
             self.map
         }
 
-        fn path(&self, places: usize) -> Vec<usize> {
-            let vertex = |(step, &place)| if step < self.lost_for { (place + 1) % 3 } else { place };
-            let path: Vec<usize> = self.places[..self.seen].iter().enumerate().map(vertex).collect();
+        fn path(&self, places: usize) -> Vec<Option<usize>> {
+            let vertex = |(step, &place)| Some(if step < self.lost_for { (place + 1) % 3 } else { place });
+            let path: Vec<Option<usize>> = self.places[..self.seen].iter().enumerate().map(vertex).collect();
             path[self.seen - places..].to_vec()
         }
 
@@ -240,6 +242,7 @@ mod tests {
         let settings = Settings {
             paths: 1,
             lengths: lengths.to_vec(),
+            walk: WalkKind::Uniform,
             seed: 1,
             filter: Filter::Robust(RobustConfig::DEFAULT),
             prior,
@@ -247,12 +250,13 @@ mod tests {
             prior_refinement_steps: 0,
             search_from_truth: 0,
             hints: Default::default(),
+            bearings: Default::default(),
             fingerprint_bits: 12,
             ngram_length: NgramLength::new(3).unwrap(),
             threads: 1,
         };
         let walks = all_walks(&environment, 3, 100).unwrap();
-        judge(&Trial::draw(&environment, &walks, &settings, 0), &settings, start)
+        judge(&Trial::draw(&environment, &walks, &settings, 0).unwrap(), &settings, start)
     }
 
     #[test]

@@ -8,7 +8,7 @@ use super::{
 };
 use serde::Serialize;
 use std::{collections::BTreeMap, fmt, time::Duration};
-use toposlam::{Direction, PaperConfig, RobustConfig};
+use toposlam::{Direction, OrderedConfig, PaperConfig, RobustConfig};
 
 /// The width of a bin of [`Row::consistency_bins`], in millimetres.
 pub const BIN_MM: u16 = 20;
@@ -27,10 +27,14 @@ pub struct Report {
 pub struct SettingsReport {
     /// The seed of all paths.
     pub seed: u64,
+    /// How the paths were drawn: `uniform`, `forward` or `explore`.
+    pub walk: &'static str,
     /// Where the n-grams of the environment came from: `path`, `exploration` or `none`.
     pub prior: String,
     /// The hints besides fingerprints, as on the command line.
     pub hints: String,
+    /// How the bearings of ways were drawn: `spread` or `right-angles`.
+    pub bearings: &'static str,
     /// Refinement steps of the filter after each place.
     pub refinement_steps: u32,
     /// Refinement steps of the filter after each place of the prior.
@@ -75,6 +79,21 @@ pub enum FilterReport {
         /// Probability of a wrong degree in the filter's model, 0 to 1.
         wrong_degree: f64,
     },
+    /// Those of the ordered filter. The probabilities and the noise are those of the filter's model.
+    Ordered {
+        /// Initial estimate of the standard deviation of a fingerprint, in millimetres.
+        noise_mm: u16,
+        /// Probability of a wrong exit, 0 to 1.
+        wrong_exit: f64,
+        /// Probability that a way is not seen, 0 to 1.
+        missed_way: f64,
+        /// Probability that something is seen that is no way, 0 to 1.
+        false_way: f64,
+        /// Standard deviation of a bearing, in milliradians.
+        bearing_noise_mrad: u16,
+        /// Standard deviation of a travel time, as a share of it.
+        travel_noise: f64,
+    },
 }
 
 impl SettingsReport {
@@ -82,8 +101,10 @@ impl SettingsReport {
     pub fn of(settings: &Settings, filters: &[Filter]) -> Self {
         Self {
             seed: settings.seed,
+            walk: settings.walk.name(),
             prior: settings.prior.name().into(),
             hints: settings.hints.to_string(),
+            bearings: settings.bearings.name(),
             refinement_steps: settings.refinement_steps,
             prior_refinement_steps: settings.prior_refinement_steps,
             search_from_truth: settings.search_from_truth,
@@ -129,6 +150,22 @@ impl From<Filter> for FilterReport {
                 wrong_turn: f64::from(wrong_turn_permille) / 1000.0,
                 wrong_degree: f64::from(wrong_degree_permille) / 1000.0,
             },
+            Filter::Ordered(OrderedConfig {
+                noise_mm,
+                wrong_exit_permille,
+                missed_way_permille,
+                false_way_permille,
+                bearing_noise_mrad,
+                travel_noise_permille,
+                ..
+            }) => Self::Ordered {
+                noise_mm,
+                wrong_exit: f64::from(wrong_exit_permille) / 1000.0,
+                missed_way: f64::from(missed_way_permille) / 1000.0,
+                false_way: f64::from(false_way_permille) / 1000.0,
+                bearing_noise_mrad,
+                travel_noise: f64::from(travel_noise_permille) / 1000.0,
+            },
         }
     }
 }
@@ -142,7 +179,7 @@ pub struct Row {
     pub environments: usize,
     /// The seed they were drawn with; `null` for an environment from a file.
     pub environment_seed: Option<u64>,
-    /// The filter: `paper` or `robust`.
+    /// The filter: `ordered`, `robust` or `paper`.
     pub filter: &'static str,
     /// Number of paths.
     pub paths: usize,
@@ -271,11 +308,12 @@ fn row(case: &Case, settings: &Settings, results: &[PathResult], check_point: us
 
 impl fmt::Display for Report {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let SettingsReport { seed, prior, hints, fingerprint_bits, ngram_length, filters, refinement_steps, .. } =
-            &self.settings;
+        let SettingsReport {
+            seed, walk, prior, hints, fingerprint_bits, ngram_length, filters, refinement_steps, ..
+        } = &self.settings;
         write!(
             f,
-            "seed {seed}, prior {prior}, hints {hints}, {fingerprint_bits} bits, n = {ngram_length}, {refinement_steps} refinement steps"
+            "seed {seed}, walk {walk}, prior {prior}, hints {hints}, {fingerprint_bits} bits, n = {ngram_length}, {refinement_steps} refinement steps"
         )?;
         for (name, filter) in filters {
             // The parameters by the names they have in JSON.

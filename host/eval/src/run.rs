@@ -40,7 +40,10 @@ impl<'a> Course<'a> {
     }
 
     /// Draws a path.
-    pub fn trial(&self, path: u64) -> Trial<'a> {
+    ///
+    /// # Errors
+    /// [`EvaluationError::Corridors`] when the hints are ways that a robot cannot perceive.
+    pub fn trial(&self, path: u64) -> Result<Trial<'a>, EvaluationError> {
         let environment = path as usize % self.explored.len();
         Trial::draw(self.case.environment(path), &self.explored[environment], self.settings, path)
     }
@@ -62,10 +65,10 @@ pub fn evaluate(
     let most_explored = course.explored.iter().map(Vec::len).max().unwrap_or(0);
     let start = choose(settings, most_explored)?;
     let one = |path| {
-        let result = judge(&course.trial(path as u64), settings, start);
+        let result = course.trial(path as u64).map(|trial| judge(&trial, settings, start));
         path_done();
         result
     };
     let results = parallel::map(settings.paths, settings.threads, one).map_err(|_| EvaluationError::Threads)?;
-    Ok(rows(case, settings, &results))
+    Ok(rows(case, settings, &results.into_iter().collect::<Result<Vec<_>, _>>()?))
 }

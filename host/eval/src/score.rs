@@ -1,6 +1,6 @@
 //! Scores a map against the smallest equivalent of the traversed environment.
 
-use super::graph::Graph;
+use super::{graph::Graph, rotation::RotationSystem};
 use std::collections::BTreeSet;
 
 /// The scores of one map. A map vertex represents the class at which it was mostly visited.
@@ -55,6 +55,18 @@ pub fn score_map_from(map: &Graph, path: &[usize], truth: &Graph, classes: &[usi
         edge_f1: if pairs == 0 { 1.0 } else { 2.0 * common as f64 / pairs as f64 },
         location: if steps == 0 { 0.0 } else { right as f64 / steps as f64 },
     }
+}
+
+/// Whether a map has the vertices, the edges and the order of the ways of the truth, one for each: the vertices by the class at
+/// which they were mostly visited, and the edges up to their numbers. Loops and parallel edges are told apart.
+///
+/// # Panics
+/// As [`score_map`].
+pub fn has_the_same_ways(map: &RotationSystem, path: &[usize], truth: &RotationSystem, classes: &[usize]) -> bool {
+    let class_of_vertex = majority_classes(map.vertex_count(), truth.vertex_count(), path, classes);
+    let vertex_of = |class| class_of_vertex.iter().position(|&other| other == Some(class));
+    let image: Option<Vec<usize>> = (0..truth.vertex_count()).map(vertex_of).collect();
+    image.is_some_and(|image| truth.equals(map, &image))
 }
 
 /// Whether the last vertex of a path represents the class of the robot, judged only by the path so far.
@@ -142,6 +154,21 @@ mod tests {
     fn steps_before_the_first_judged_one_only_assign_classes_to_vertices() {
         let score = score_map_from(&truth(), &[0, 1, 2, 3, 2, 0, 1, 1], &truth(), &CLASSES, 6);
         assert_eq!(score, MapScore { exact: true, isomorphic: true, edge_f1: 1.0, location: 1.0 / 2.0 });
+    }
+
+    #[test]
+    fn ways_are_the_same_up_to_numbers_but_not_with_an_edge_elsewhere() {
+        // The triangle with a tail, and a map with other numbers of vertices and edges.
+        let truth = RotationSystem::new(vec![vec![5, 0], vec![1, 2], vec![3, 6, 4], vec![7]]);
+        let map = RotationSystem::new(vec![vec![2, 5], vec![6], vec![0, 3], vec![1, 4, 7]]);
+        let path = [2, 0, 3, 1, 3, 2, 0, 3];
+        assert!(has_the_same_ways(&map, &path, &truth, &CLASSES));
+        // Another visit does not matter, but most visits.
+        assert!(has_the_same_ways(&map, &[2, 0, 3, 1, 3, 2, 0, 0], &truth, &CLASSES));
+        assert!(!has_the_same_ways(&map, &[0, 2, 3, 1, 3, 0, 0, 3], &truth, &CLASSES));
+        // The tail is at another vertex.
+        let wrong = RotationSystem::new(vec![vec![2, 5, 7], vec![6], vec![0, 3], vec![1, 4]]);
+        assert!(!has_the_same_ways(&wrong, &path, &truth, &CLASSES));
     }
 
     #[test]

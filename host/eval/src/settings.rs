@@ -1,8 +1,13 @@
 //! The settings of an evaluation: number and length of the paths, the filter, and its prior.
 
-use super::{hints::Hints, prior::PriorSource};
+use super::{
+    corridors::{Bearings, CorridorsError},
+    hints::Hints,
+    prior::PriorSource,
+    walk::WalkKind,
+};
 use std::fmt;
-use toposlam::{ConfigError, NgramLength, PaperConfig, RobustConfig};
+use toposlam::{ConfigError, NgramLength, OrderedConfig, PaperConfig, RobustConfig};
 
 /// Settings of an evaluation.
 #[derive(Clone, Debug, PartialEq)]
@@ -12,6 +17,8 @@ pub struct Settings {
     /// The check points: the numbers of places after which the map of a path is judged, in ascending order, 1 or more.
     /// The last one is the length of a path.
     pub lengths: Vec<usize>,
+    /// How a path is drawn.
+    pub walk: WalkKind,
     /// The seed of walks, noise, hints and filter.
     pub seed: u64,
     /// The filter and its parameters.
@@ -26,6 +33,8 @@ pub struct Settings {
     pub search_from_truth: u32,
     /// The hints besides fingerprints.
     pub hints: Hints,
+    /// How the bearings of ways are drawn.
+    pub bearings: Bearings,
     /// Resolution of a fingerprint in bits, 1 to 12; the filter stores 12.
     pub fingerprint_bits: u32,
     /// The length `n` of the n-grams of the prior and of the judged distance.
@@ -39,6 +48,12 @@ impl Settings {
     pub fn longest(&self) -> usize {
         self.lengths.last().copied().unwrap_or(0)
     }
+
+    /// Whether maps are judged by their ways: the filter knows them, and the robot reports them. Otherwise they are judged by what
+    /// labels can distinguish.
+    pub fn judges_ways(&self) -> bool {
+        self.hints.ways && matches!(self.filter, Filter::Ordered(_))
+    }
 }
 
 /// The filter to evaluate.
@@ -48,6 +63,8 @@ pub enum Filter {
     Paper(PaperConfig),
     /// Distinct hypotheses with repair moves.
     Robust(RobustConfig),
+    /// Distinct hypotheses over the ways of a map.
+    Ordered(OrderedConfig),
 }
 
 impl Filter {
@@ -56,6 +73,7 @@ impl Filter {
         match self {
             Self::Paper(_) => "paper",
             Self::Robust(_) => "robust",
+            Self::Ordered(_) => "ordered",
         }
     }
 }
@@ -78,6 +96,8 @@ pub enum EvaluationError {
         /// Capacity of the table in n-grams.
         most: usize,
     },
+    /// The hints are ways, but a robot cannot perceive those of an environment.
+    Corridors(CorridorsError),
     /// The threads did not start.
     Threads,
 }
@@ -93,6 +113,7 @@ impl fmt::Display for EvaluationError {
                 write!(f, "a path, with the n-grams before it, may visit at most {most} places")
             }
             Self::TooManyNgrams { most } => write!(f, "the prior may need more than {most} n-grams"),
+            Self::Corridors(error) => error.fmt(f),
             Self::Threads => write!(f, "the threads for the paths did not start"),
         }
     }

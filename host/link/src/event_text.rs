@@ -12,8 +12,8 @@ use toposlam::FaultKind;
 use toposlam::drive::DriveState;
 use toposlam::ring::Echo;
 use toposlam::wire::{
-    Arrival, Belief, Evidence, Factors, GoalStatus, Health, Hello, Info, Message, Outcome, Remapped, Row, Velocity,
-    Worst,
+    Arrival, Belief, Evidence, Exploration, Factors, GoalStatus, Health, Hello, Info, Message, Outcome, Remapped, Row,
+    Velocity, VertexWays, Way, Worst,
 };
 
 use crate::listener::Event;
@@ -65,6 +65,11 @@ pub fn message(message: &Message) -> String {
         Message::Reply(reply) => format!("reply to request {}: {}", reply.request, outcome(&reply.outcome)),
         Message::Velocity(velocity) => steering(velocity),
         Message::GoalStatus(GoalStatus { vertex, state }) => format!("goal vertex {vertex}: {state}"),
+        Message::Ways(ways) => self::ways(ways),
+        Message::Exploration(Exploration { frontiers, complete: true }) => {
+            format!("exploration complete, {frontiers} frontiers")
+        }
+        Message::Exploration(Exploration { frontiers, complete: false }) => format!("{frontiers} frontiers"),
         other => format!("{other:?}"),
     }
 }
@@ -163,8 +168,24 @@ pub fn factors(factors: &Factors) -> String {
             nats(ln_consistency_q16),
             nats(ln_size_q16)
         ),
+        Factors::Ordered { ln_labels_q16, ln_moves_q16 } => {
+            format!("labels {:.2}, moves {:.2}", nats(ln_labels_q16), nats(ln_moves_q16))
+        }
         other => format!("{other:?}"),
     }
+}
+
+fn ways(ways: &VertexWays) -> String {
+    let way = |way: &Way| {
+        let bearing = (f64::from(way.bearing_mrad) / 1000.0).to_degrees();
+        let time = way.travel_frames.map_or_else(String::new, |frames| format!(" in {frames} frames"));
+        match way.leads_to {
+            Some(end) => format!("{bearing:.0}° to {}.{}{time}", end.vertex, end.way),
+            None => format!("{bearing:.0}° frontier"),
+        }
+    };
+    let list: Vec<String> = ways.ways.as_slice().iter().map(way).collect();
+    format!("ways of vertex {}: {}", ways.vertex, if list.is_empty() { "none".to_owned() } else { list.join(", ") })
 }
 
 fn reasons(evidence: &Evidence) -> String {

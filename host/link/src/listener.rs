@@ -228,7 +228,7 @@ mod tests {
         assert_eq!(heard_with(hello).understanding(), Understanding::Whole);
         let newer = Hello { protocol_version: PROTOCOL_VERSION + 1, ..hello };
         let text = heard_with(newer).understanding().to_string();
-        assert!(text.contains("version 5, this program 4"), "{text}");
+        assert!(text.contains("version 6, this program 5"), "{text}");
         let other = Hello { schema_hash: 7, ..hello };
         assert!(matches!(heard_with(other).understanding(), Understanding::Not(_)));
     }

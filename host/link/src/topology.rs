@@ -18,16 +18,27 @@
 //! ```
 
 use petgraph::graph::UnGraph;
-use toposlam::wire::{MapReplica, crc32};
-use toposlam::{Map, VertexId};
+use toposlam::wire::{MapReplica, VertexWays, Way, WayId, crc32};
+use toposlam::{Filter, Map, VertexId};
 
-/// The vertices of a map and the edges between them.
+/// The vertices of a map and the edges between them; with their ways, if the robot knows them.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Hash)]
 pub struct TopologicalMap {
     /// Vertices 0, 1, … with their labels.
     pub vertices: Vec<Vertex>,
-    /// Each edge once, smaller vertex first, in ascending order; equal ends are a self-loop.
+    /// Each pair of vertices that an edge joins, smaller vertex first, in ascending order; equal ends are a self-loop.
     pub edges: Vec<(u8, u8)>,
+    /// The ways of each vertex in counter-clockwise order; empty if the robot knows edges only.
+    pub ways: Vec<Vec<Way>>,
+}
+
+/// An edge between two ways.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub struct WayEdge {
+    /// Its ends, the smaller first.
+    pub ends: [WayId; 2],
+    /// The mean travel time in ring frames, if it is known.
+    pub travel_frames: Option<u16>,
 }
 
 /// One vertex, with its label.
@@ -59,7 +70,58 @@ impl TopologicalMap {
             bytes.extend(label.visits.to_le_bytes());
             bytes.extend(row.to_le_bytes());
         }
+        for ways in &self.ways {
+            bytes.push(ways.len() as u8);
+            for way in ways {
+                bytes.extend(way.bearing_mrad.to_le_bytes());
+                bytes.extend(way.leads_to.map_or([u8::MAX; 2], |end| [end.vertex, end.way]));
+                bytes.extend(way.travel_frames.unwrap_or(0).to_le_bytes());
+            }
+        }
         crc32(&bytes)
+    }
+
+    /// The map of a filter, with its ways if it knows them.
+    pub fn of<const V: usize>(filter: &impl Filter<V>) -> Self {
+        let map = filter.map();
+        let ways = filter.darts().map_or_else(Vec::new, |darts| {
+            map.vertices().map(|vertex| VertexWays::of(darts, vertex).ways.as_slice().to_vec()).collect()
+        });
+        Self { ways, ..Self::from(map) }.without_empty_ways()
+    }
+
+    /// A map in which no vertex has a way is one without ways.
+    fn without_empty_ways(mut self) -> Self {
+        if self.ways.iter().all(Vec::is_empty) {
+            self.ways.clear();
+        }
+        self
+    }
+
+    /// A way; `None` if the map has no such way.
+    pub fn way(&self, id: WayId) -> Option<&Way> {
+        self.ways.get(usize::from(id.vertex))?.get(usize::from(id.way))
+    }
+
+    /// Every way with its id, vertex by vertex in counter-clockwise order.
+    pub fn all_ways(&self) -> impl Iterator<Item = (WayId, &Way)> {
+        let of = |(vertex, ways): (u8, _)| (0..).zip(ways).map(move |(way, data)| (WayId { vertex, way }, data));
+        (0..).zip(&self.ways).flat_map(of)
+    }
+
+    /// Every edge between two ways once: parallel edges and loops each count. Until the whole map has arrived, an edge of which
+    /// only one end is known is left out.
+    pub fn way_edges(&self) -> impl Iterator<Item = WayEdge> {
+        self.all_ways().filter_map(|(id, way)| {
+            let end = way.leads_to.filter(|&end| id < end)?;
+            let is_mutual = self.way(end)?.leads_to == Some(id);
+            is_mutual.then_some(WayEdge { ends: [id, end], travel_frames: way.travel_frames })
+        })
+    }
+
+    /// Every frontier, a way that nobody has driven.
+    pub fn frontiers(&self) -> impl Iterator<Item = WayId> {
+        self.all_ways().filter(|(_, way)| way.leads_to.is_none()).map(|(id, _)| id)
     }
 
     /// Neighbours of each vertex in ascending order; a vertex with a self-loop is its own neighbour.
@@ -85,10 +147,13 @@ impl<const V: usize> From<&MapReplica<V>> for TopologicalMap {
         let label = |vertex| {
             replica.row(vertex).map_or(Vertex::default(), |row| Vertex { radius_mm: row.radius_mm, visits: row.visits })
         };
-        Self { vertices: (0..replica.vertices()).map(label).collect(), edges: replica.edges().collect() }
+        let ways = (0..replica.vertices()).map(|vertex| replica.ways(vertex).to_vec()).collect();
+        let vertices = (0..replica.vertices()).map(label).collect();
+        Self { vertices, edges: replica.edges().collect(), ways }.without_empty_ways()
     }
 }
 
+/// The map without its ways; [`TopologicalMap::of`] has them.
 impl<const V: usize> From<&Map<V>> for TopologicalMap {
     fn from(map: &Map<V>) -> Self {
         let label = |(vertex, label): (VertexId, &toposlam::Fingerprint)| Vertex {
@@ -96,7 +161,8 @@ impl<const V: usize> From<&Map<V>> for TopologicalMap {
             visits: map.visits(vertex),
         };
         let edges = map.edges().map(|(a, b)| (a.into(), b.into()));
-        Self { vertices: map.vertices().zip(map.labels()).map(label).collect(), edges: edges.collect() }
+        let vertices = map.vertices().zip(map.labels()).map(label).collect();
+        Self { vertices, edges: edges.collect(), ways: Vec::new() }
     }
 }
 
@@ -111,8 +177,8 @@ mod tests {
         let [a, b, c] = [1200, 400, 700].map(|radius_mm| map.add_vertex(radius(radius_mm)).unwrap());
         map.add_edge(a, c);
         map.add_edge(b, b);
-        assert_eq!(TopologicalMap::from(&map).digest(), toposlam::wire::map_digest(&map));
-        assert_eq!(TopologicalMap::default().digest(), toposlam::wire::map_digest(&Map::<8>::new()));
+        assert_eq!(TopologicalMap::from(&map).digest(), toposlam::wire::map_digest(&map, None));
+        assert_eq!(TopologicalMap::default().digest(), toposlam::wire::map_digest(&Map::<8>::new(), None));
     }
 
     #[test]

@@ -4,7 +4,7 @@ use core::hint::black_box;
 
 use static_cell::ConstStaticCell;
 use toposlam::{
-    ConfigError, FaultCounters,
+    ConfigError, FaultCounters, Filter,
     persist::snapshot::{Resume, Snapshot, SnapshotError, SnapshotPolicy, Writer},
     reference,
     wire::{Reporter, map_digest},
@@ -33,7 +33,7 @@ pub(crate) fn mapper() {
     let seen = mapper.observe(&any_frame(), any_turn());
     reporter.report(mapper, seen.as_ref(), &FaultCounters::new().opaque(), any_answer);
     reporter.resync(any_answer);
-    black_box((reporter.refused(), map_digest(mapper.map())));
+    black_box((reporter.refused(), map_digest(mapper.map(), mapper.filter().darts())));
 }
 
 fn snapshot(mapper: &mut reference::RobotMapper) {

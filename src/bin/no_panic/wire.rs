@@ -46,7 +46,11 @@ pub(crate) fn wire() {
         black_box(edge);
     }
     black_box((replica.hello(), replica.location(), replica.evidence(), replica.health()));
-    black_box((replica.belief(), replica.worst(), replica.goal_status()));
+    black_box((replica.belief(), replica.worst(), replica.goal_status(), replica.exploration()));
+    black_box((replica.ways(black_box(3)), replica.has_ways()));
+    for frontier in replica.frontiers() {
+        black_box(frontier);
+    }
     black_box((replica.neighbours(black_box(3)), replica.fault(FaultKind::BusError.opaque())));
     if let Some(Err(error)) = replica.hello().map(|hello: Hello| hello.check()) {
         show::<HelloError>(error);

@@ -30,7 +30,7 @@ const EMPTY: Candidate = Candidate {
 
 /// Up to `N` hypotheses of which no two have the same map and place.
 #[derive(Clone, Debug)]
-pub(super) struct Beam<const N: usize, const V: usize, const D: usize, const T: usize> {
+pub(crate) struct Beam<const N: usize, const V: usize, const D: usize, const T: usize> {
     slots: [Hypothesis<V, D, T>; N],
     /// The slots of the hypotheses, the best first; behind `len` the free ones.
     order: [u8; N],
@@ -62,11 +62,27 @@ impl<const N: usize, const V: usize, const D: usize, const T: usize> Beam<N, V, 
     }
 
     /// Whether the filter was not started.
+    /// Starts without any hypothesis; [`Beam::append`] follows.
+    #[cfg(feature = "snapshot")]
+    pub(crate) fn start_empty(&mut self) {
+        self.clear();
+        self.len = 0;
+    }
+
+    /// Appends a hypothesis that is not better than the last one. A full beam drops it.
+    #[cfg(feature = "snapshot")]
+    pub(crate) fn append(&mut self, hypothesis: &Hypothesis<V, D, T>) {
+        if let Some(slot) = self.slots.get_mut(self.len) {
+            slot.clone_from(hypothesis);
+            self.len += 1;
+        }
+    }
+
     pub(super) fn is_empty(&self) -> bool {
         self.len == 0
     }
 
-    pub(super) fn len(&self) -> usize {
+    pub(crate) fn len(&self) -> usize {
         self.len
     }
 
@@ -75,7 +91,7 @@ impl<const N: usize, const V: usize, const D: usize, const T: usize> Beam<N, V, 
         self.slots.get(usize::from(*slot))
     }
 
-    pub(super) fn iter(&self) -> impl Iterator<Item = &Hypothesis<V, D, T>> {
+    pub(crate) fn iter(&self) -> impl Iterator<Item = &Hypothesis<V, D, T>> {
         self.order.iter().take(self.len).filter_map(|&slot| self.slots.get(usize::from(slot)))
     }
 

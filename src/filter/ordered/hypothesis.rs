@@ -17,16 +17,16 @@ const LOST: f32 = 20.0;
 
 /// The statistics of one vertex: 12 bytes.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub(super) struct Label {
-    pub(super) mean: f32,
-    pub(super) scatter: f32,
-    pub(super) visits: u16,
+pub(crate) struct Label {
+    pub(crate) mean: f32,
+    pub(crate) scatter: f32,
+    pub(crate) visits: u16,
     /// At how many visits the ways were seen; saturates.
-    pub(super) looks: u8,
+    pub(crate) looks: u8,
 }
 
 impl Label {
-    const NONE: Self = Self { mean: 0.0, scatter: 0.0, visits: 0, looks: 0 };
+    pub(crate) const NONE: Self = Self { mean: 0.0, scatter: 0.0, visits: 0, looks: 0 };
 
     /// With one more label (Welford's update).
     fn including(mut self, steps: u16) -> Self {
@@ -119,18 +119,18 @@ impl Gain {
 }
 
 #[derive(Clone, Debug)]
-pub(super) struct Hypothesis<const V: usize, const D: usize, const T: usize> {
-    pub(super) map: DartMap<V, D>,
-    pub(super) labels: [Label; V],
+pub(crate) struct Hypothesis<const V: usize, const D: usize, const T: usize> {
+    pub(crate) map: DartMap<V, D>,
+    pub(crate) labels: [Label; V],
     /// The way by which the robot came to the newest place; [`NONE`] before the first.
-    pub(super) at: u8,
-    pub(super) label_evidence: f32,
+    pub(crate) at: u8,
+    pub(crate) label_evidence: f32,
     /// All evidence but that of the labels.
-    pub(super) rest: f32,
+    pub(crate) rest: f32,
     /// Identifies the map; vertices are numbered in the order of their first visit.
-    pub(super) map_key: u32,
+    pub(crate) map_key: u32,
     /// The way by which the robot came to each place of the record.
-    pub(super) path: [u8; T],
+    pub(crate) path: [u8; T],
 }
 
 impl<const V: usize, const D: usize, const T: usize> Hypothesis<V, D, T> {
@@ -145,7 +145,7 @@ impl<const V: usize, const D: usize, const T: usize> Hypothesis<V, D, T> {
         path: [0; T],
     };
 
-    pub(super) fn clear(&mut self) {
+    pub(crate) fn clear(&mut self) {
         self.map.clear();
         self.labels.fill(Label::NONE);
         self.at = NONE;

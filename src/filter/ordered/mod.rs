@@ -19,6 +19,12 @@ mod tests;
 
 pub use config::OrderedConfig;
 
+#[cfg(feature = "snapshot")]
+pub(crate) use {
+    hypothesis::{Hypothesis as OrderedHypothesis, Label as OrderedLabel},
+    record::Entry as OrderedEntry,
+};
+
 use super::vertex_ids::VertexIds;
 use super::{Exit, Filter, FilterCapacities, Observation, Update, WorstNgram, worst_ngram};
 use crate::config_error::ConfigError;
@@ -30,7 +36,7 @@ use fold::Union;
 use hypothesis::Hypothesis;
 use model::{Model, SAME_WAY};
 use record::{Entry, Record};
-use repair::Repair;
+pub(crate) use repair::Repair;
 use replay::Translation;
 
 /// The noise is estimated at every fifth place from here on.
@@ -62,32 +68,32 @@ const NOISE_FROM: u32 = 10;
 /// ```
 #[derive(Clone, Debug)]
 pub struct OrderedFilter<const N: usize, const V: usize, const D: usize, const T: usize> {
-    config: OrderedConfig,
-    seed: u64,
-    observed: u32,
-    refined: u32,
-    model: Model,
-    record: Record<T>,
-    beam: Beam<N, V, D, T>,
-    draft: Hypothesis<V, D, T>,
+    pub(crate) config: OrderedConfig,
+    pub(crate) seed: u64,
+    pub(crate) observed: u32,
+    pub(crate) refined: u32,
+    pub(crate) model: Model,
+    pub(crate) record: Record<T>,
+    pub(crate) beam: Beam<N, V, D, T>,
+    pub(crate) draft: Hypothesis<V, D, T>,
     source: Hypothesis<V, D, T>,
     translation: Translation<V, D>,
     union: Union<D>,
-    repair: Repair,
+    pub(crate) repair: Repair,
     /// The best hypothesis before the record begins.
-    base: Hypothesis<V, D, T>,
-    vertex_ids: VertexIds<V>,
+    pub(crate) base: Hypothesis<V, D, T>,
+    pub(crate) vertex_ids: VertexIds<V>,
     /// The published map as a graph, and with its ways.
-    map: Map<V>,
-    darts: DartMap<V, D>,
+    pub(crate) map: Map<V>,
+    pub(crate) darts: DartMap<V, D>,
     /// The published way by which the robot came to each place of the record; [`NONE`] where that is unknown.
-    path: [u8; T],
+    pub(crate) path: [u8; T],
     /// The published way by which it came to the newest place.
-    at: u8,
-    worst: WorstNgram,
-    belief_q16: PerVertex<u32, V>,
-    map_probability_q16: u32,
-    faults: FaultCounters,
+    pub(crate) at: u8,
+    pub(crate) worst: WorstNgram,
+    pub(crate) belief_q16: PerVertex<u32, V>,
+    pub(crate) map_probability_q16: u32,
+    pub(crate) faults: FaultCounters,
 }
 
 impl<const N: usize, const V: usize, const D: usize, const T: usize> OrderedFilter<N, V, D, T> {
@@ -217,6 +223,13 @@ impl<const N: usize, const V: usize, const D: usize, const T: usize> OrderedFilt
         self.beam.begin_with(&self.draft);
         self.publish();
         Some(self.draft.score())
+    }
+
+    /// Publishes the result of refinement steps; for evaluations.
+    #[doc(hidden)]
+    #[cfg(feature = "_test")]
+    pub fn refresh(&mut self) {
+        self.publish();
     }
 }
 

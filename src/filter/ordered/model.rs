@@ -60,8 +60,8 @@ impl Predictive {
 
 /// The logarithms of all probabilities, computed once for a configuration and a scale of the noise.
 #[derive(Clone, Debug)]
-pub(super) struct Model {
-    pub(super) labels: LabelModel,
+pub(crate) struct Model {
+    pub(crate) labels: LabelModel,
     bearing_rad: f32,
     missed_share: f32,
     bearings: Predictive,
@@ -104,7 +104,7 @@ impl Model {
     }
 
     /// Takes the parameters of a configuration.
-    pub(super) fn configure(&mut self, config: &OrderedConfig) {
+    pub(crate) fn configure(&mut self, config: &OrderedConfig) {
         let share = |permille: u16| f32::from(permille) / 1000.0;
         self.bearing_rad = share(config.bearing_noise_mrad);
         self.missed_share = share(config.missed_way_permille);
@@ -124,7 +124,7 @@ impl Model {
     }
 
     /// Sets the standard deviation of the labels, in steps.
-    pub(super) fn set_noise(&mut self, noise_steps: f32) {
+    pub(crate) fn set_noise(&mut self, noise_steps: f32) {
         self.labels.set_noise(noise_steps);
         let label = -0.5 * libm::logf(2.0 * core::f32::consts::PI * 1.3 * noise_steps * noise_steps) - 0.5;
         let way = self.bearings.ln(3, 0.0) - 0.5 - self.missed_share * 3.0 - 0.1;

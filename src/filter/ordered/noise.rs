@@ -18,7 +18,10 @@ pub(super) fn returning_deviation<const T: usize>(record: &Record<T>) -> Option<
     let mut counts = [0_u16; DIFFERENCES];
     let mut returns = 0_u16;
     for last in 2..record.len() {
-        if record.get(last).starts() || record.get(last - 1).starts() || !record.get(last).exit().is_some_and(Exit::is_back) {
+        if record.get(last).starts()
+            || record.get(last - 1).starts()
+            || !record.get(last).exit().is_some_and(Exit::is_back)
+        {
             continue;
         }
         let difference = record.get(last).steps.abs_diff(record.get(last - 2).steps);

@@ -30,7 +30,8 @@ impl<const N: usize, const V: usize, const D: usize, const T: usize> OrderedFilt
         let published = self.record.len().saturating_sub(1);
         let pair = |(&before, &now): (&u8, &u8)| Some((VertexId::new(self.darts.vertex(before))?, vertex_of(now)?));
         let observations = self.path.iter().zip(&best.path).take(published).filter_map(pair);
-        let label = |vertex: VertexId| Some(best.label(vertex.into())).filter(|held| held.visits >= 2).map(|held| held.mean);
+        let label =
+            |vertex: VertexId| Some(best.label(vertex.into())).filter(|held| held.visits >= 2).map(|held| held.mean);
         self.vertex_ids.update::<T>(&self.map, vertices.into(), observations, label);
         let ids = &self.vertex_ids.ids;
         self.map.clear();
@@ -41,18 +42,34 @@ impl<const N: usize, const V: usize, const D: usize, const T: usize> OrderedFilt
             let _ = self.map.add_known_vertex(label.fingerprint(), label.visits.into());
         }
         self.darts.renumber_from(&best.map, |vertex| VertexId::new(vertex).map_or(NONE, |vertex| ids[vertex].into()));
+        self.path.iter_mut().zip(&best.path).take(self.record.len()).for_each(|(slot, &dart)| *slot = dart);
+        self.at = best.at;
+        self.add_edges();
+        self.publish_probabilities()
+    }
+
+    /// Adds the edges of the published ways to the published map.
+    pub(crate) fn add_edges(&mut self) {
         for (a, b) in self.darts.view().edges() {
             if let (Some(a), Some(b)) = (self.darts.view().vertex(a), self.darts.view().vertex(b)) {
                 self.map.add_edge(a, b);
             }
         }
-        self.path.iter_mut().zip(&best.path).take(self.record.len()).for_each(|(slot, &dart)| *slot = dart);
-        self.at = best.at;
-        self.publish_probabilities()
+    }
+
+    /// Finds the n-gram that the published map explains worst.
+    pub(crate) fn find_worst(&mut self) {
+        let place = |index| {
+            let entry = self.record.get(index);
+            let vertex = self.path.get(index).and_then(|&dart| VertexId::new(self.darts.vertex(dart)));
+            Some((entry.steps, entry.starts(), vertex))
+        };
+        self.worst = worst_ngram::<V, T>(self.record.len(), &self.map, place);
     }
 
     /// Publishes the belief, the probability of the map, and the n-gram that it explains worst.
     fn publish_probabilities(&mut self) -> Update {
+        self.find_worst();
         let Some(best) = self.beam.get(0) else { return Update::NONE };
         let ids = &self.vertex_ids.ids;
         let (mut same, mut all) = (0.0, 0.0);
@@ -71,7 +88,9 @@ impl<const N: usize, const V: usize, const D: usize, const T: usize> OrderedFilt
             if hypothesis.map_key == best.map_key {
                 same += weight;
             }
-            let vertex = VertexId::new(best.counterpart(hypothesis, self.record.len()));
+            // Vertices without edges are not part of the key of a map, so the other one may have more of them.
+            let vertex = VertexId::new(best.counterpart(hypothesis, self.record.len()))
+                .filter(|&vertex| u8::from(vertex) < best.map.vertices());
             if let Some(slot) = vertex.and_then(|vertex| belief.get_mut(ids[vertex].index())) {
                 *slot += weight;
             }
@@ -81,12 +100,6 @@ impl<const N: usize, const V: usize, const D: usize, const T: usize> OrderedFilt
         let vertex = best.map.vertex(best.at);
         let (labels, moves) = (best.label_evidence, best.rest);
         let lead_q16 = q16((-rival).clamp(-LEAD_MAX, LEAD_MAX));
-        let place = |index| {
-            let entry = self.record.get(index);
-            let vertex = self.path.get(index).and_then(|&dart| VertexId::new(self.darts.vertex(dart)));
-            Some((entry.steps, entry.starts(), vertex))
-        };
-        self.worst = worst_ngram::<V, T>(self.record.len(), &self.map, place);
         Update {
             place_index: self.observed.wrapping_sub(1),
             vertex: VertexId::new(vertex).map_or(VertexId::FIRST, |vertex| ids[vertex]),
@@ -125,10 +138,12 @@ impl<const V: usize, const D: usize, const T: usize> Hypothesis<V, D, T> {
     /// at its vertex. [`NONE`] for a vertex that the other one visits for the first time.
     fn counterpart(&self, other: &Self, places: usize) -> u8 {
         if self.map_key == other.map_key {
-            return self.map.vertex(other.at);
+            // The numbers of their ways may differ; vertices are numbered in the order of their first visit.
+            return other.map.vertex(other.at);
         }
         let vertex = other.map.vertex(other.at);
-        let earlier = (0..places.saturating_sub(1)).rev().find(|&index| other.map.vertex(other.came_by(index)) == vertex);
+        let earlier =
+            (0..places.saturating_sub(1)).rev().find(|&index| other.map.vertex(other.came_by(index)) == vertex);
         earlier.map_or(NONE, |index| self.map.vertex(self.came_by(index)))
     }
 }

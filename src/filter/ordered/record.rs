@@ -47,6 +47,20 @@ impl Entry {
         }
     }
 
+    /// The ways, the flags and the exit as the 8 bytes of a snapshot.
+    #[cfg(feature = "snapshot")]
+    pub(crate) const fn to_bytes(self) -> [u8; WAYS + 1] {
+        let [a, b, c, d, e, f, g] = self.ways;
+        [a, b, c, d, e, f, g, self.exit]
+    }
+
+    /// From the radius, the travel time and the bytes of a snapshot.
+    #[cfg(feature = "snapshot")]
+    pub(crate) const fn from_bytes(steps: u16, ln_travel: u16, bytes: [u8; WAYS + 1]) -> Self {
+        let [a, b, c, d, e, f, g, exit] = bytes;
+        Self { steps, ln_travel, ways: [a, b, c, d, e, f, g], exit }
+    }
+
     const fn flags(&self) -> u8 {
         let [flags, ..] = self.ways;
         flags
@@ -96,7 +110,7 @@ impl<const T: usize> Record<T> {
         Self { entries: [Entry::NONE; T], len: 0 }
     }
 
-    pub(super) fn clear(&mut self) {
+    pub(crate) fn clear(&mut self) {
         self.len = 0;
     }
 
@@ -108,7 +122,7 @@ impl<const T: usize> Record<T> {
         self.len == T
     }
 
-    pub(super) fn push(&mut self, entry: Entry) {
+    pub(crate) fn push(&mut self, entry: Entry) {
         if let Some(slot) = self.entries.get_mut(self.len) {
             *slot = entry;
             self.len += 1;

@@ -52,7 +52,7 @@ enum Stray {
 
 /// How far a repair has got.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Repair {
+pub(crate) struct Repair {
     /// The next observation; `None` when no repair is under way.
     next: Option<usize>,
     stray: Stray,
@@ -63,7 +63,7 @@ pub(super) struct Repair {
 }
 
 impl Repair {
-    pub(super) const NONE: Self = Self { next: None, stray: Stray::Never, follows: false, temperature: 0.0 };
+    pub(crate) const NONE: Self = Self { next: None, stray: Stray::Never, follows: false, temperature: 0.0 };
 }
 
 impl<const N: usize, const V: usize, const D: usize, const T: usize> OrderedFilter<N, V, D, T> {

@@ -154,7 +154,8 @@ impl<const V: usize, const D: usize, const T: usize> Builder<'_, V, D, T> {
         };
         let gain = to.gain(self.model, &entry, reported, choice);
         let par = self.model.par(entry.count(), entry.ln_travel > 0) + SURPRISE;
-        let is_expected = choice.target == Target::Known && reported == ReportedExit::Way(choice.exit) && gain.total() > par - 1.0;
+        let is_expected =
+            choice.target == Target::Known && reported == ReportedExit::Way(choice.exit) && gain.total() > par - 1.0;
         Some(Step { choice, gain, is_decision: !is_expected && index > 0 })
     }
 

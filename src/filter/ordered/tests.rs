@@ -76,7 +76,9 @@ impl Building {
                 let came_by = at;
                 let chosen = rand_core::Rng::next_u32(&mut random) as usize % ways.len();
                 let told = if wrong(step) { (chosen + 1) % ways.len() } else { chosen };
-                exit = Some(told.checked_sub(1).map_or(Exit::Back, |other| Exit::from_bearing_mrad(others[other].0).unwrap()));
+                exit = Some(
+                    told.checked_sub(1).map_or(Exit::Back, |other| Exit::from_bearing_mrad(others[other].0).unwrap()),
+                );
                 let leaves = if chosen == 0 { at } else { others[chosen - 1].1 };
                 frames = Some(self.way(leaves).2);
                 at = self.way(leaves).1;
@@ -122,7 +124,11 @@ fn loops_and_parallel_corridors_are_mapped() {
         filter.start(CONFIG, seed).unwrap();
         let walk = HOUSE.walk(60, seed, |_| false);
         run(&mut filter, &walk);
-        assert!(HOUSE.is_mapped(&filter, &walk), "seed {seed}: {:?}", filter.darts().unwrap().edges().collect::<Vec<_>>());
+        assert!(
+            HOUSE.is_mapped(&filter, &walk),
+            "seed {seed}: {:?}",
+            filter.darts().unwrap().edges().collect::<Vec<_>>()
+        );
         assert_eq!((filter.darts.vertices(), filter.darts.genus()), (3, 0));
     }
 }

@@ -44,6 +44,8 @@ pub const FILTER_SECTION: u8 = 1;
 pub(crate) const ROBUST: u8 = 1;
 /// As [`ROBUST`], of the paper's filter.
 pub(crate) const PAPER: u8 = 2;
+/// As [`ROBUST`], of the ordered filter.
+pub(crate) const ORDERED: u8 = 3;
 
 /// The first bytes of every snapshot.
 const MAGIC: [u8; 4] = *b"TSLM";

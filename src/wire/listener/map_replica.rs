@@ -3,15 +3,19 @@
 use crate::fault::FaultKind;
 use crate::map::VertexSet;
 
+use crate::WAYS_MAX;
 use crate::wire::decoder::{Arrival, Header};
-use crate::wire::digest::rows_digest;
+use crate::wire::digest::digest;
 use crate::wire::robot::bit;
-use crate::wire::{Belief, Evidence, GoalStatus, Health, Hello, Location, Message, Remapped, Row, Worst};
+use crate::wire::{
+    Belief, Evidence, Exploration, GoalStatus, Health, Hello, List, Location, Message, Remapped, Row, VertexWays, Way,
+    WayId, Worst,
+};
 
 /// A replica of the robot's map and of the newest of its other messages.
 ///
 /// Messages may be lost, repeated or late: late ones are ignored, and the robot repeats its map in turn. `V` must be at
-/// least that of the robot; 64 always suffices. Memory: 16 bytes per vertex and about 280 bytes.
+/// least that of the robot; 64 always suffices. Memory: 88 bytes per vertex and about 280 bytes.
 #[derive(Clone, Debug)]
 pub struct MapReplica<const V: usize> {
     vertices: u8,
@@ -19,6 +23,7 @@ pub struct MapReplica<const V: usize> {
     neighbours: [u64; V],
     /// The vertices with a known label.
     labelled: u64,
+    ways: [List<Way, WAYS_MAX>; V],
     /// The digest of the robot's map, unless a message was lost since it was received.
     digest: Option<u32>,
     hello: Option<Hello>,
@@ -28,8 +33,11 @@ pub struct MapReplica<const V: usize> {
     belief: Option<Belief>,
     worst: Option<Worst>,
     goal_status: Option<GoalStatus>,
+    exploration: Option<Exploration>,
     faults: [u32; FaultKind::ALL.len()],
 }
+
+const NO_WAYS: List<Way, WAYS_MAX> = List::empty(Way::NONE);
 
 impl<const V: usize> MapReplica<V> {
     /// An empty replica.
@@ -40,6 +48,7 @@ impl<const V: usize> MapReplica<V> {
             labels: [(0, 0); V],
             neighbours: [0; V],
             labelled: 0,
+            ways: [NO_WAYS; V],
             digest: None,
             hello: None,
             location: None,
@@ -48,6 +57,7 @@ impl<const V: usize> MapReplica<V> {
             belief: None,
             worst: None,
             goal_status: None,
+            exploration: None,
             faults: [0; FaultKind::ALL.len()],
         }
     }
@@ -86,14 +96,18 @@ impl<const V: usize> MapReplica<V> {
             Message::Remapped(remapped) => self.remap(&remapped),
             Message::Worst(worst) => self.worst = Some(worst),
             Message::GoalStatus(goal_status) => self.goal_status = Some(goal_status),
+            Message::Ways(ways) => self.set_ways(ways),
+            Message::Exploration(exploration) => self.exploration = Some(exploration),
             Message::Place { .. } | Message::Ring { .. } | Message::Velocity(_) | Message::Reply(_) => {}
         }
     }
 
     /// Whether the replica equals the robot's map: its digest is the one that the robot sent last, and no frame was lost
-    /// since. Cost: the CRC of 14 bytes per vertex.
+    /// since. Cost: the CRC of 15 bytes per vertex and 6 bytes per way.
     pub fn is_converged(&self) -> bool {
-        self.digest == Some(rows_digest(self.vertices, (0..self.vertices).filter_map(|vertex| self.row(vertex))))
+        let rows = (0..self.vertices).filter_map(|vertex| self.row(vertex));
+        let ways = self.ways.iter().take(self.vertices.into()).copied();
+        self.digest == Some(digest(self.vertices, rows, ways))
     }
 
     /// Whether the label of every known vertex was received. Edges may be missing.
@@ -118,7 +132,26 @@ impl<const V: usize> MapReplica<V> {
         self.neighbours.get(usize::from(vertex)).copied().unwrap_or(0)
     }
 
-    /// Every edge once, as pairs of vertices with the smaller id first.
+    /// The ways of a vertex in counter-clockwise order; none for an unknown vertex, and for a robot that knows edges only.
+    ///
+    /// Before the replica has converged, the other end of an edge may lead elsewhere or be unknown.
+    pub fn ways(&self, vertex: u8) -> &[Way] {
+        self.ways.get(usize::from(vertex)).map_or(&[], List::as_slice)
+    }
+
+    /// Whether the robot has sent ways.
+    pub fn has_ways(&self) -> bool {
+        self.ways.iter().any(|ways| !ways.as_slice().is_empty())
+    }
+
+    /// Every frontier, a way that nobody has driven, in the order of the vertices.
+    pub fn frontiers(&self) -> impl Iterator<Item = WayId> + '_ {
+        let ends = |vertex| (0..).zip(self.ways(vertex)).map(move |(way, of)| (WayId { vertex, way }, of));
+        (0..self.vertices).flat_map(ends).filter(|(_, way)| way.leads_to.is_none()).map(|(id, _)| id)
+    }
+
+    /// Every edge once, as pairs of vertices with the smaller id first. Parallel edges count as one;
+    /// [`MapReplica::ways`] tells them apart.
     pub fn edges(&self) -> impl Iterator<Item = (u8, u8)> + '_ {
         let later = |a, &b: &u8| a <= b;
         let neighbours = |a| VertexSet::from_bits(self.neighbours(a)).iter().map(u8::from);
@@ -160,6 +193,11 @@ impl<const V: usize> MapReplica<V> {
         self.goal_status
     }
 
+    /// How far the map is explored; `None` for a robot that knows edges only.
+    pub const fn exploration(&self) -> Option<Exploration> {
+        self.exploration
+    }
+
     /// The last count of a kind of fault.
     pub fn fault(&self, kind: FaultKind) -> u32 {
         self.faults.get(kind as usize).copied().unwrap_or(0)
@@ -170,6 +208,9 @@ impl<const V: usize> MapReplica<V> {
         self.digest = None;
         self.vertices = remapped.count(self.vertices).min(V as u8);
         self.labelled = remapped.apply(&mut self.labels, &mut self.neighbours, self.labelled);
+        remapped.apply_to_ways(&mut self.ways, NO_WAYS, |ways| {
+            ways.as_mut_slice().iter_mut().for_each(|way| *way = way.remapped(remapped));
+        });
         self.location = self.location.and_then(|location| location.remapped(remapped));
         if let Some(belief) = &mut self.belief {
             belief.remap(remapped);
@@ -200,11 +241,26 @@ impl<const V: usize> MapReplica<V> {
         }
     }
 
+    fn set_ways(&mut self, VertexWays { vertex, ways }: VertexWays) {
+        if let Some(slot) = self.ways.get_mut(usize::from(vertex)) {
+            *slot = ways;
+            self.vertices = self.vertices.max(vertex.saturating_add(1));
+        }
+    }
+
     /// Removes the vertices from `vertices` on and their edges.
     fn resize(&mut self, vertices: u8) {
         let kept = bit(vertices).wrapping_sub(1);
         for (row, vertex) in self.neighbours.iter_mut().zip(0u8..) {
             *row = if vertex < vertices { *row & kept } else { 0 };
+        }
+        for (ways, vertex) in self.ways.iter_mut().zip(0u8..) {
+            if vertex >= vertices {
+                *ways = NO_WAYS;
+            } else {
+                let beyond = |way: &Way| way.leads_to.is_some_and(|end| end.vertex >= vertices);
+                ways.as_mut_slice().iter_mut().filter(|way| beyond(way)).for_each(|way| *way = way.frontier());
+            }
         }
         self.labelled &= kept;
         self.vertices = vertices.min(V as u8);

@@ -127,6 +127,27 @@ impl Remapped {
         labelled_now
     }
 
+    /// Applies the new ids to what is known of the ways of each vertex. Merged vertices keep the ways of the first; ids from `V`
+    /// on are dropped. `rename` applies the new ids within the ways of one vertex.
+    pub(in crate::wire) fn apply_to_ways<T: Copy, const V: usize>(
+        &self,
+        ways: &mut [T; V],
+        unknown: T,
+        rename: impl Fn(&mut T),
+    ) {
+        let before = *ways;
+        *ways = [unknown; V];
+        let mut known = 0;
+        for (vertex, mut of_vertex) in (0..).zip(before) {
+            let Some(now) = self.now(vertex).filter(|&now| known & bit(now) == 0) else { continue };
+            if let Some(slot) = ways.get_mut(usize::from(now)) {
+                rename(&mut of_vertex);
+                *slot = of_vertex;
+                known |= bit(now);
+            }
+        }
+    }
+
     /// The number of vertices after the update, without vertices that it added.
     pub(in crate::wire) fn count(&self, before: u8) -> u8 {
         (0..before).filter_map(|vertex| self.now(vertex)).map(|now| now.saturating_add(1)).max().unwrap_or(0)

@@ -26,7 +26,18 @@ impl<T: Copy + Default, const MAX: usize> List<T, MAX> {
     }
 }
 
+impl<T: Copy, const MAX: usize> List<T, MAX> {
+    /// The empty list. `default` is the default value of an element.
+    pub(in crate::wire) const fn empty(default: T) -> Self {
+        Self { length: 0, elements: [default; MAX] }
+    }
+}
+
 impl<T, const MAX: usize> List<T, MAX> {
+    pub(in crate::wire) fn as_mut_slice(&mut self) -> &mut [T] {
+        self.elements.get_mut(..usize::from(self.length)).unwrap_or(&mut [])
+    }
+
     /// All elements.
     pub fn as_slice(&self) -> &[T] {
         self.elements.get(..usize::from(self.length)).unwrap_or(&[])

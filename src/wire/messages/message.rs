@@ -5,16 +5,16 @@ use core::fmt;
 use serde::{Deserialize, Serialize};
 
 use super::code::codes;
-use super::{Belief, Echoes, Evidence, GoalStatus, Remapped, Reply, Velocity, Worst};
+use super::{Belief, Echoes, Evidence, Exploration, GoalStatus, Remapped, Reply, Velocity, VertexWays, Worst};
 use crate::filter::{Filter, FilterCapacities, Update};
 use crate::mapper::MapperConfig;
 use crate::place::Fingerprint;
 
 /// The version of the messages and requests.
-pub const PROTOCOL_VERSION: u16 = 4;
+pub const PROTOCOL_VERSION: u16 = 5;
 
 /// The 64-bit FNV-1a hash of the schema in `docs/wire.md`; a test computes it from the types.
-pub const SCHEMA_HASH: u64 = 0x8352_6E81_4B95_713B;
+pub const SCHEMA_HASH: u64 = 0x8409_EFC8_CE2D_743A;
 
 /// A message from the robot. Every message but [`Message::Remapped`] gives absolute values, not increments.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -94,6 +94,10 @@ pub enum Message {
     Velocity(Velocity),
     /// The status of the goal, whenever it changes.
     GoalStatus(GoalStatus),
+    /// The ways of a vertex, from a filter that knows them.
+    Ways(VertexWays),
+    /// How far the map is explored, from a filter that knows the ways.
+    Exploration(Exploration),
 }
 
 /// The introduction of a robot.

@@ -11,6 +11,7 @@ mod navigation;
 mod payload;
 mod reply;
 mod setting;
+mod ways;
 
 pub use belief::{Belief, Remapped, VertexProbability, Worst};
 pub use command::{CHUNK_BYTES, Chunk, Command, Request};
@@ -24,3 +25,4 @@ pub use navigation::{GoalState, GoalStatus, Velocity};
 pub use payload::Payload;
 pub use reply::{Info, Outcome, Refusal, Reply, Version};
 pub use setting::{FilterSettings, Setting, Settings};
+pub use ways::{Exploration, VertexWays, Way, WayId};

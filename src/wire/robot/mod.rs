@@ -2,6 +2,7 @@
 
 mod inbox;
 mod reporter;
+mod sent_ways;
 mod staging;
 
 pub use inbox::Inbox;

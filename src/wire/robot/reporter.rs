@@ -4,17 +4,21 @@ use core::fmt;
 
 use crate::fault::{FaultCounters, FaultKind};
 use crate::filter::{Filter, Update};
-use crate::map::Map;
+use crate::map::Darts;
 use crate::mapper::Mapper;
 use crate::place::Place;
 use crate::wire::digest::{map_digest, row_of};
-use crate::wire::{Belief, Capacities, Evidence, Hello, List, Location, Message, Remapped, ResetCause, Row, Worst};
+use crate::wire::robot::sent_ways::SentWays;
+use crate::wire::{
+    Belief, Capacities, Evidence, Exploration, Hello, List, Location, Message, Remapped, ResetCause, Row, VertexWays,
+    Worst,
+};
 
 /// Decides which messages to send. It remembers what was sent, and passes each message to a callback, which returns
 /// whether the transmit queue accepted it. It never waits.
 ///
 /// A change whose message was refused is sent again with the next update or with the repeated map, whichever comes first. The
-/// caller sends `Health`, `Ring`, `Velocity` and `Reply` itself. Memory: 16 bytes per vertex and about 150 bytes.
+/// caller sends `Health`, `Ring`, `Velocity` and `Reply` itself. Memory: 28 bytes per vertex and about 150 bytes.
 #[derive(Clone, Debug)]
 pub struct Reporter<const V: usize> {
     hello: Hello,
@@ -23,10 +27,13 @@ pub struct Reporter<const V: usize> {
     vertices: u8,
     labels: [(u16, u32); V],
     neighbours: [u64; V],
+    ways: [SentWays; V],
     /// The number of vertices of the filter's map after the last place.
     vertices_before: u8,
     location: Option<Location>,
     belief: Option<Belief>,
+    complete: bool,
+    exploration: Option<Exploration>,
     faults: [u32; FaultKind::ALL.len()],
     /// The next piece of the repeated map: a vertex, or one of the pieces after the last vertex.
     turn: u8,
@@ -58,9 +65,12 @@ impl<const V: usize> Reporter<V> {
             vertices: 0,
             labels: [(0, 0); V],
             neighbours: [0; V],
+            ways: [SentWays::NONE; V],
             vertices_before: 0,
             location: None,
             belief: None,
+            complete: false,
+            exploration: None,
             faults: [0; FaultKind::ALL.len()],
             turn: 0,
             fault_turn: 0,
@@ -76,9 +86,12 @@ impl<const V: usize> Reporter<V> {
         self.ticks_to_hello = 0;
         self.vertices = 0;
         self.neighbours = [0; V];
+        self.ways = [SentWays::NONE; V];
         self.vertices_before = 0;
         self.location = None;
         self.belief = None;
+        self.complete = false;
+        self.exploration = None;
         self.faults = [0; FaultKind::ALL.len()];
         self.turn = 0;
         self.fault_turn = 0;
@@ -87,7 +100,7 @@ impl<const V: usize> Reporter<V> {
     }
 
     /// Starts a new round of the repeated map with a `Hello`, at four pieces per tick; the next round has the usual pace
-    /// again. A listener that requests the map has it after `vertices / 4 + 1` ticks without a lost frame.
+    /// again. A listener that requests the map has it after a quarter of the ticks, rounded up, without a lost frame.
     pub fn send_full(&mut self) {
         self.ticks_to_hello = 0;
         self.turn = 0;
@@ -143,7 +156,12 @@ impl<const V: usize> Reporter<V> {
         }
         let mut faults = *faults;
         faults.add(&mapper.faults());
-        self.tick(mapper.map(), &faults, send);
+        self.tick(mapper.filter(), &faults, send);
+    }
+
+    /// Takes from the drive whether it reaches no frontier any more; [`Reporter::tick`] sends a change.
+    pub fn set_complete(&mut self, complete: bool) {
+        self.complete = complete;
     }
 
     /// How many messages the queue refused since the start; saturates.
@@ -151,11 +169,11 @@ impl<const V: usize> Reporter<V> {
         self.refused
     }
 
-    /// Sends the update of one place: changed vertex ids, changed vertices and edges, the size of the map, location, belief,
-    /// evidence and worst n-gram.
+    /// Sends the update of one place: changed vertex ids, changed vertices, edges and ways, the size of the map, location,
+    /// belief, evidence and worst n-gram.
     ///
     /// A vertex with several changed edges is sent as one `Row`, so that a change of the best hypothesis does not flood the
-    /// line: at most 2 `V` + 6 messages. Cost: linear in the number of vertices and edges.
+    /// line: at most 3 `V` + 6 messages. Cost: linear in the number of vertices and edges.
     pub fn update(
         &mut self,
         filter: &impl Filter<V>,
@@ -205,8 +223,17 @@ impl<const V: usize> Reporter<V> {
                 }
             }
         }
+        if let Some(darts) = filter.darts() {
+            for vertex in map.vertices() {
+                let ways = VertexWays::of(darts, vertex);
+                if self.ways.get(vertex.index()) != Some(&SentWays::of(&ways)) {
+                    changed = true;
+                    self.send_ways(&ways, &mut send);
+                }
+            }
+        }
         if changed {
-            self.send_size(map, &mut send);
+            self.send_size(filter, &mut send);
         }
         let location = Location::from(update);
         if self.location != Some(location) && self.send(&Message::Location(location), &mut send) {
@@ -222,12 +249,13 @@ impl<const V: usize> Reporter<V> {
 
     /// Sends the changed fault counts and the next piece of the repeated map. Call it at a steady pace.
     ///
-    /// The pieces of a round are each vertex, the size of the map, the location, the belief, and one fault with a count
-    /// above 0. A listener that receives the `vertices + 4` ticks of a round without loss has converged. At most one message
-    /// per kind of fault, a `Hello`, and one piece (four after [`Reporter::send_full`]).
+    /// The pieces of a round are each vertex, the ways of each vertex if the filter knows them, the size of the map, the
+    /// location, the belief, the exploration, and one fault with a count above 0. A listener that receives the `vertices + 5`
+    /// ticks of a round without loss has converged; with ways `2 · vertices + 5`. At most one message per kind of fault, a
+    /// `Hello`, an `Exploration`, and one piece (four after [`Reporter::send_full`]).
     pub fn tick(
         &mut self,
-        map: &Map<V>,
+        filter: &impl Filter<V>,
         faults: &FaultCounters,
         mut send: impl FnMut(&Message) -> Result<(), QueueFull>,
     ) {
@@ -240,8 +268,12 @@ impl<const V: usize> Reporter<V> {
                 self.send_fault(kind, faults.count(kind), &mut send);
             }
         }
+        let exploration = filter.darts().map(|darts| self.explored(darts));
+        if self.exploration != exploration {
+            self.send_exploration(exploration, &mut send);
+        }
         for _ in 0..if self.sends_full { Self::PIECES_PER_FULL_TICK } else { 1 } {
-            if !self.send_piece(map, faults, &mut send) {
+            if !self.send_piece(filter, faults, &mut send) {
                 return;
             }
             if self.turn == 0 {
@@ -254,21 +286,29 @@ impl<const V: usize> Reporter<V> {
     /// Sends the next piece of the repeated map, if there is anything to send; returns whether the queue accepted it.
     fn send_piece(
         &mut self,
-        map: &Map<V>,
+        filter: &impl Filter<V>,
         faults: &FaultCounters,
         send: &mut impl FnMut(&Message) -> Result<(), QueueFull>,
     ) -> bool {
+        let (map, darts) = (filter.map(), filter.darts());
         let vertices = map.vertices().len() as u8;
-        let piece = map.vertices().nth(self.turn.into());
-        let done = match self.turn.checked_sub(vertices) {
-            None => piece.is_none_or(|vertex| self.send_row(row_of(map, vertex), send)),
-            Some(0) => self.send_size(map, send),
+        let of_vertices = if darts.is_some() { 2 * vertices } else { vertices };
+        let done = match self.turn.checked_sub(of_vertices) {
+            None => match (map.vertices().nth((self.turn % vertices.max(1)).into()), darts) {
+                (Some(vertex), Some(darts)) if self.turn >= vertices => {
+                    self.send_ways(&VertexWays::of(darts, vertex), send)
+                }
+                (Some(vertex), _) => self.send_row(row_of(map, vertex), send),
+                (None, _) => true,
+            },
+            Some(0) => self.send_size(filter, send),
             Some(1) => self.location.is_none_or(|location| self.send(&Message::Location(location), send)),
             Some(2) => self.belief.is_none_or(|belief| self.send(&Message::Belief(belief), send)),
+            Some(3) => self.send_exploration(darts.map(|darts| self.explored(darts)), send),
             Some(_) => self.next_fault(faults).is_none_or(|kind| self.send_fault(kind, faults.count(kind), send)),
         };
         if done {
-            self.turn = if self.turn >= vertices.saturating_add(3) { 0 } else { self.turn.saturating_add(1) };
+            self.turn = if self.turn >= of_vertices.saturating_add(4) { 0 } else { self.turn.saturating_add(1) };
         }
         done
     }
@@ -292,9 +332,36 @@ impl<const V: usize> Reporter<V> {
         taken
     }
 
-    fn send_size(&mut self, map: &Map<V>, send: &mut impl FnMut(&Message) -> Result<(), QueueFull>) -> bool {
+    fn send_ways(&mut self, ways: &VertexWays, send: &mut impl FnMut(&Message) -> Result<(), QueueFull>) -> bool {
+        let taken = self.send(&Message::Ways(*ways), send);
+        if let (true, Some(sent)) = (taken, self.ways.get_mut(usize::from(ways.vertex))) {
+            *sent = SentWays::of(ways);
+        }
+        taken
+    }
+
+    fn explored(&self, darts: Darts<'_>) -> Exploration {
+        Exploration { frontiers: darts.frontiers().count() as u8, complete: self.complete }
+    }
+
+    /// Returns whether there was nothing to send or the queue accepted it.
+    fn send_exploration(
+        &mut self,
+        exploration: Option<Exploration>,
+        send: &mut impl FnMut(&Message) -> Result<(), QueueFull>,
+    ) -> bool {
+        let Some(explored) = exploration else { return true };
+        let taken = self.send(&Message::Exploration(explored), send);
+        if taken {
+            self.exploration = exploration;
+        }
+        taken
+    }
+
+    fn send_size(&mut self, filter: &impl Filter<V>, send: &mut impl FnMut(&Message) -> Result<(), QueueFull>) -> bool {
+        let map = filter.map();
         let (vertices, edges) = (map.vertices().len() as u8, map.edges().count() as u16);
-        let taken = self.send(&Message::Map { vertices, edges, digest: map_digest(map) }, send);
+        let taken = self.send(&Message::Map { vertices, edges, digest: map_digest(map, filter.darts()) }, send);
         if taken {
             self.vertices = vertices;
         }
@@ -336,6 +403,7 @@ impl<const V: usize> Reporter<V> {
     fn note_remapped(&mut self, remapped: &Remapped) {
         let labelled = bit(self.vertices).wrapping_sub(1);
         remapped.apply(&mut self.labels, &mut self.neighbours, labelled);
+        remapped.apply_to_ways(&mut self.ways, SentWays::NONE, |ways| ways.remap(remapped));
         self.vertices = remapped.count(self.vertices).min(V as u8);
         self.location = self.location.and_then(|location| location.remapped(remapped));
         if let Some(belief) = &mut self.belief {
@@ -362,6 +430,9 @@ impl<const V: usize> Reporter<V> {
         let kept = bit(vertices).wrapping_sub(1);
         for (row, vertex) in self.neighbours.iter_mut().zip(0u8..) {
             *row = if vertex < vertices { *row & kept } else { 0 };
+        }
+        for (ways, vertex) in self.ways.iter_mut().zip(0u8..) {
+            if vertex < vertices { ways.forget_from(vertices) } else { *ways = SentWays::NONE }
         }
         self.vertices = vertices;
     }

@@ -70,7 +70,7 @@ impl DriveArguments {
         let nodes: Vec<Option<usize>> = detections.iter().map(|detection| detection.node).collect();
         let score = score_path(map, path, truth, &nodes);
         let (vertices, edges) = (map.vertices().len(), map.edges().count());
-        println!("map: {vertices} vertices, {edges} edges, digest {:08x}", map_digest(map));
+        println!("map: {vertices} vertices, {edges} edges, digest {:08x}", map_digest(map, None));
         println!(
             "against the true map: exact {}, isomorphic {}, edge F1 {:.2}, located in {:.0} % of the places",
             yes_or_no(score.exact),

@@ -1,6 +1,5 @@
 //! `toposlam evaluate`: the rate of exact maps over many random paths through known environments.
 
-use super::filter::FilterArgument;
 use anyhow::{Context, ensure};
 use clap::{Args, ValueEnum};
 use std::{
@@ -8,10 +7,11 @@ use std::{
     num::NonZeroUsize,
     path::{Path, PathBuf},
 };
-use toposlam::{Direction, NgramLength, PaperConfig, RobustConfig};
+use toposlam::{Direction, NgramLength, OrderedConfig, PaperConfig, RobustConfig};
 use toposlam_cli::progress::Progress;
 use toposlam_eval::{
     case::{Case, Placements},
+    corridors::Bearings,
     environment::Environment,
     export::export,
     family::Family,
@@ -21,6 +21,7 @@ use toposlam_eval::{
     report::{Report, Row, SettingsReport},
     run::evaluate,
     settings::{Filter, Settings},
+    walk::WalkKind,
 };
 
 /// Arguments of `toposlam evaluate`.
@@ -35,7 +36,8 @@ pub(crate) struct Arguments {
     /// Write the observations and the ground truth of each path to files in this directory.
     #[arg(long, value_name = "DIR")]
     export: Option<PathBuf>,
-    /// Run both filters on the same paths, and write the paper's Fig. 4 and 5 as fig4.svg and fig5.svg to this directory.
+    /// Run the default filter and the paper's on the same paths, and write the paper's Fig. 4 and 5 as fig4.svg and fig5.svg to this
+    /// directory.
     #[arg(long, value_name = "DIR", conflicts_with = "filter")]
     plot: Option<PathBuf>,
     /// Output format.
@@ -55,7 +57,7 @@ struct CaseArguments {
     placements: Vec<Placements>,
     /// COUNT random environments of V_MIN to V_MAX places. DEGREE (mean number of neighbours), LABELS (number of
     /// categories) and NOISE (standard deviation of fingerprints, in metres) are numbers or ranges A-B. CLASS is
-    /// general [default] or right-resolving.
+    /// general [default], right-resolving or multigraph.
     #[arg(long = "family", value_name = "SEED,COUNT,V_MIN,V_MAX,DEGREE,LABELS,NOISE[,CLASS]")]
     families: Vec<Family>,
 }
@@ -70,23 +72,29 @@ struct CourseArguments {
     /// drawn again.
     #[arg(long, alias = "length", value_name = "T,...", default_value = "100", value_delimiter = ',')]
     lengths: Vec<NonZeroUsize>,
+    /// How a path is drawn: uniform, forward (turns back at dead ends only) or explore (towards the nearest way that was not driven).
+    #[arg(long, value_name = "KIND", default_value = "uniform")]
+    walk: WalkKind,
     /// Seed of paths, noise, hints and filter.
     #[arg(long, value_name = "S", default_value_t = 1)]
     seed: u64,
     /// Source of the prior n-grams of the environment.
     #[arg(long, default_value = "none")]
     prior: PriorChoice,
-    /// Hints besides fingerprints: none, turn, degree or both. The probabilities of a missing and of a wrong hint are 0 to 1
-    /// [default: 0].
+    /// Hints besides fingerprints: none, turn, degree, both, ways, or ways with travel times. Ways have further settings: missed=P for
+    /// the probability that one is not seen, bearing_mrad=B and travel=SHARE for the noise. All settings are 0 by default.
     #[arg(long, value_name = "HINTS[,missing=P,wrong=P]", default_value = "none")]
     hints: Hints,
-    /// Robust: refinement steps after each place; a robot does one per ring frame.
+    /// Bearings of the ways of a place, if the hints are ways.
+    #[arg(long, default_value = "spread")]
+    bearings: BearingsChoice,
+    /// Ordered and robust: refinement steps after each place; a robot does one per ring frame.
     #[arg(long, alias = "polish", value_name = "STEPS", default_value_t = 10)]
     refinement_steps: u32,
-    /// Robust: refinement steps after each place of the prior n-grams.
+    /// Ordered and robust: refinement steps after each place of the prior n-grams.
     #[arg(long, alias = "polish-prior", value_name = "STEPS", default_value_t = 10)]
     prior_refinement_steps: u32,
-    /// Robust: refinement steps of a search that starts at the true path, after each length of --lengths. Reports how often it prefers
+    /// Ordered and robust: refinement steps of a search that starts at the true path, after each length of --lengths. Reports how often it prefers
     /// another map, which is a bound for every search with this score. 0 for no search.
     #[arg(long, value_name = "STEPS", default_value_t = 0)]
     from_truth: u32,
@@ -101,16 +109,16 @@ struct CourseArguments {
     threads: usize,
 }
 
-/// The filter and its parameters. Parameters of the other filter are refused.
+/// The filter and its parameters. Parameters of other filters are refused.
 #[derive(Args)]
 struct FilterArguments {
-    /// Filter to evaluate.
-    #[arg(long, default_value = "robust")]
-    filter: FilterArgument,
-    /// Hypotheses (robust) or particles (paper), 1 to 100 [default: 10].
+    /// Filter to evaluate [default: ordered with hints of ways, otherwise robust].
+    #[arg(long)]
+    filter: Option<FilterName>,
+    /// Hypotheses (robust) or particles (paper), 1 to 100 [default: 10]. The ordered filter has 10.
     #[arg(long, alias = "particles", value_name = "N")]
     hypotheses: Option<u8>,
-    /// Robust: initial estimate of the standard deviation of a fingerprint, in millimetres
+    /// Ordered and robust: initial estimate of the standard deviation of a fingerprint, in millimetres
     /// [default: 30].
     #[arg(long, value_name = "MM")]
     noise_mm: Option<u16>,
@@ -123,6 +131,21 @@ struct FilterArguments {
     /// Robust: assumed probability of a wrong degree hint, 0 to 1 in steps of 0.001 [default: 0.1].
     #[arg(long, value_name = "P", value_parser = permille)]
     wrong_degree: Option<u16>,
+    /// Ordered: assumed probability of a wrong exit, 0.001 to 0.5 in steps of 0.001 [default: 0.04].
+    #[arg(long, value_name = "P", value_parser = permille)]
+    wrong_exit: Option<u16>,
+    /// Ordered: assumed probability that a way is not seen, 0.001 to 0.5 in steps of 0.001 [default: 0.05].
+    #[arg(long, value_name = "P", value_parser = permille)]
+    missed_way: Option<u16>,
+    /// Ordered: assumed probability that something is seen that is no way, 0.001 to 0.5 in steps of 0.001 [default: 0.02].
+    #[arg(long, value_name = "P", value_parser = permille)]
+    false_way: Option<u16>,
+    /// Ordered: assumed standard deviation of a bearing, in milliradians [default: 100].
+    #[arg(long, value_name = "MRAD")]
+    bearing_noise_mrad: Option<u16>,
+    /// Ordered: assumed standard deviation of a travel time as a share of it, 0.01 to 0.5 in steps of 0.001 [default: 0.1].
+    #[arg(long, value_name = "SHARE", value_parser = permille)]
+    travel_noise: Option<u16>,
     /// Paper: consistency measure, both halves of Eq. 2 or one [default: two-sided].
     #[arg(long)]
     consistency: Option<ConsistencyChoice>,
@@ -135,6 +158,34 @@ struct FilterArguments {
     /// Paper: phi of Eq. 9, 0 to 1 in steps of 0.001 [default: 0.1].
     #[arg(long, value_name = "PHI", value_parser = permille)]
     penalty: Option<u16>,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+enum FilterName {
+    /// Ordered filter: maps the ways of each place in their order.
+    Ordered,
+    /// Robust filter.
+    Robust,
+    /// Filter of the paper.
+    Paper,
+}
+
+impl FilterName {
+    fn option(self) -> &'static str {
+        match self {
+            Self::Ordered => "ordered",
+            Self::Robust => "robust",
+            Self::Paper => "paper",
+        }
+    }
+}
+
+#[derive(Clone, Copy, ValueEnum)]
+enum BearingsChoice {
+    /// The gaps between the ways are equal up to a half of the mean gap.
+    Spread,
+    /// Multiples of a right angle, or of half of one if there are more than four ways.
+    RightAngles,
 }
 
 #[derive(Clone, Copy, ValueEnum)]
@@ -178,7 +229,8 @@ fn permille(text: &str) -> Result<u16, String> {
 }
 
 pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
-    let filters = arguments.filter.chosen(arguments.plot.is_some())?;
+    let default = if arguments.course.hints.ways { FilterName::Ordered } else { FilterName::Robust };
+    let filters = arguments.filter.chosen(default, arguments.plot.is_some())?;
     let evaluations =
         filters.iter().map(|&filter| arguments.course.settings(filter)).collect::<anyhow::Result<Vec<_>>>()?;
     let settings = &evaluations[0];
@@ -194,7 +246,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
         }
     }
     if let Some(directory) = &arguments.plot {
-        plot(directory, &cases, &report.rows, settings.longest()).context("--plot")?;
+        plot(directory, &cases, &report.rows, &filters, settings.longest()).context("--plot")?;
     }
     match arguments.format {
         Format::Json => println!("{}", serde_json::to_string(&report)?),
@@ -220,16 +272,20 @@ fn evaluate_with_progress(case: &Case, settings: &Settings) -> anyhow::Result<Ve
     Ok(rows)
 }
 
-/// Plots both filters side by side at the last check point.
-fn plot(directory: &Path, cases: &[Case], rows: &[Row], length: usize) -> anyhow::Result<()> {
-    let judged = |filter| rows.iter().filter(move |row| row.filter == filter && row.length == length);
+/// Plots two filters side by side at the last check point.
+fn plot(directory: &Path, cases: &[Case], rows: &[Row], filters: &[Filter], length: usize) -> anyhow::Result<()> {
+    let judged = |filter: &Filter| {
+        let name = filter.name();
+        rows.iter().filter(move |row| row.filter == name && row.length == length)
+    };
+    let [first, second] = filters else { return Ok(()) };
     let pairs: Vec<Pair> = cases
         .iter()
-        .zip(judged("robust").zip(judged("paper")))
-        .map(|(case, (robust, paper))| {
+        .zip(judged(first).zip(judged(second)))
+        .map(|(case, (first_row, second_row))| {
             let mut places = case.environments.iter().map(|environment| environment.places().len());
             let first = places.next();
-            Pair { rows: [robust, paper], places: first.filter(|&first| places.all(|places| places == first)) }
+            Pair { rows: [first_row, second_row], places: first.filter(|&first| places.all(|places| places == first)) }
         })
         .collect();
     fs::create_dir_all(directory).with_context(|| directory.display().to_string())?;
@@ -262,11 +318,12 @@ impl CourseArguments {
         ensure!(lengths.is_sorted_by(|shorter, longer| shorter < longer), "--lengths: must be in ascending order");
         let filter = match filter {
             Filter::Paper(config) => Filter::Paper(config.with_ngram_length(self.ngram_length)),
-            Filter::Robust(config) => Filter::Robust(config),
+            Filter::Robust(_) | Filter::Ordered(_) => filter,
         };
         Ok(Settings {
             paths: self.paths.get(),
             lengths,
+            walk: self.walk,
             seed: self.seed,
             filter,
             prior: match self.prior {
@@ -278,6 +335,10 @@ impl CourseArguments {
             prior_refinement_steps: self.prior_refinement_steps,
             search_from_truth: self.from_truth,
             hints: self.hints,
+            bearings: match self.bearings {
+                BearingsChoice::Spread => Bearings::Spread,
+                BearingsChoice::RightAngles => Bearings::RightAngles,
+            },
             fingerprint_bits: self.fingerprint_bits,
             ngram_length,
             threads: self.threads,
@@ -286,31 +347,49 @@ impl CourseArguments {
 }
 
 impl FilterArguments {
-    /// The selected filter, or both, the robust one first.
-    fn chosen(&self, both: bool) -> anyhow::Result<Vec<Filter>> {
-        let of_robust = [
-            ("--noise-mm", self.noise_mm.is_some()),
-            ("--moves", self.moves.is_some()),
-            ("--wrong-turn", self.wrong_turn.is_some()),
-            ("--wrong-degree", self.wrong_degree.is_some()),
+    /// The selected filter or the default; for a comparison the default and the paper's filter.
+    fn chosen(&self, default: FilterName, compares: bool) -> anyhow::Result<Vec<Filter>> {
+        use FilterName::{Ordered, Paper, Robust};
+        let names = if compares { vec![default, Paper] } else { vec![self.filter.unwrap_or(default)] };
+        let parameters: [(&str, bool, &[FilterName]); 14] = [
+            ("--hypotheses", self.hypotheses.is_some(), &[Robust, Paper]),
+            ("--noise-mm", self.noise_mm.is_some(), &[Ordered, Robust]),
+            ("--moves", self.moves.is_some(), &[Robust]),
+            ("--wrong-turn", self.wrong_turn.is_some(), &[Robust]),
+            ("--wrong-degree", self.wrong_degree.is_some(), &[Robust]),
+            ("--wrong-exit", self.wrong_exit.is_some(), &[Ordered]),
+            ("--missed-way", self.missed_way.is_some(), &[Ordered]),
+            ("--false-way", self.false_way.is_some(), &[Ordered]),
+            ("--bearing-noise-mrad", self.bearing_noise_mrad.is_some(), &[Ordered]),
+            ("--travel-noise", self.travel_noise.is_some(), &[Ordered]),
+            ("--consistency", self.consistency.is_some(), &[Paper]),
+            ("--sigma-label-mm", self.sigma_label_mm.is_some(), &[Paper]),
+            ("--sigma-consistency-mm", self.sigma_consistency_mm.is_some(), &[Paper]),
+            ("--penalty", self.penalty.is_some(), &[Paper]),
         ];
-        let of_paper = [
-            ("--consistency", self.consistency.is_some()),
-            ("--sigma-label-mm", self.sigma_label_mm.is_some()),
-            ("--sigma-consistency-mm", self.sigma_consistency_mm.is_some()),
-            ("--penalty", self.penalty.is_some()),
-        ];
-        if both {
-            return Ok(vec![self.robust(), self.paper()]);
+        for (parameter, is_given, filters) in parameters {
+            let is_used = names.iter().any(|name| filters.contains(name));
+            ensure!(!is_given || is_used, "{parameter} needs --filter {}", filters[0].option());
         }
-        let (filter, other, foreign) = match self.filter {
-            FilterArgument::Ordered => unimplemented!(),
-            FilterArgument::Robust => (self.robust(), "paper", of_paper),
-            FilterArgument::Paper => (self.paper(), "robust", of_robust),
+        let filter = |name: &FilterName| match name {
+            Ordered => self.ordered(),
+            Robust => self.robust(),
+            Paper => self.paper(),
         };
-        let given = foreign.iter().find(|(_, given)| *given);
-        ensure!(given.is_none(), "{} needs --filter {other}", given.map_or("", |(name, _)| name));
-        Ok(vec![filter])
+        Ok(names.iter().map(filter).collect())
+    }
+
+    fn ordered(&self) -> Filter {
+        let default = OrderedConfig::DEFAULT;
+        Filter::Ordered(
+            default
+                .with_noise_mm(self.noise_mm.unwrap_or(default.noise_mm))
+                .with_wrong_exit_permille(self.wrong_exit.unwrap_or(default.wrong_exit_permille))
+                .with_missed_way_permille(self.missed_way.unwrap_or(default.missed_way_permille))
+                .with_false_way_permille(self.false_way.unwrap_or(default.false_way_permille))
+                .with_bearing_noise_mrad(self.bearing_noise_mrad.unwrap_or(default.bearing_noise_mrad))
+                .with_travel_noise_permille(self.travel_noise.unwrap_or(default.travel_noise_permille)),
+        )
     }
 
     fn robust(&self) -> Filter {

@@ -46,7 +46,7 @@ impl Life {
             ends.push(bytes.len());
             messages += messages_in(&exploration.board().sent);
         }
-        let map = TopologicalMap::from(exploration.robot().mapper().map());
+        let map = TopologicalMap::of(exploration.robot().mapper().filter());
         Ok(Self { bytes, ends, map })
     }
 

@@ -1,6 +1,7 @@
 //! The filters that can be evaluated, behind one interface, with few sets of capacities, because each takes seconds to
 //! compile.
 
+mod ordered;
 mod paper;
 mod robust;
 
@@ -8,10 +9,11 @@ pub(super) use paper::prior as prior_table;
 
 use super::{
     prior::{PriorSource, path_ngrams},
+    rotation::RotationSystem,
     settings::{EvaluationError, Filter, Settings},
-    trial::Trial,
+    trial::{Trial, Truth},
 };
-use toposlam::{ConfigError, Map, NgramLength, Observation, VertexId};
+use toposlam::{ConfigError, Map, NgramLength, Observation};
 
 /// Largest number of vertices of a map: the width of a row of the adjacency matrix. Fault counters count full maps.
 pub const VERTICES: usize = 64;
@@ -26,15 +28,31 @@ pub trait Candidate {
     fn observe(&mut self, observation: Observation);
     /// Runs `steps` refinement steps.
     fn refine(&mut self, steps: u32);
-    /// Map and path after a search of `steps` refinement steps from a path, given as a vertex for each place so far.
-    /// `None` for a filter without a search.
-    fn search_from(&self, path: &[VertexId], steps: u32) -> Option<(Map<VERTICES>, Vec<usize>)>;
+    /// The filter after a search of `steps` refinement steps from the true path. `None` for a filter without a search.
+    fn search_from(&self, _trial: &Trial, _truth: &Truth, _steps: u32) -> Option<Box<dyn Candidate>> {
+        None
+    }
     /// The best map.
     fn map(&self) -> Map<VERTICES>;
-    /// The vertex of each of the newest `places` places in the best map, the oldest first.
-    fn path(&self, places: usize) -> Vec<usize>;
+    /// The edges of the best map in the order of its ways; `None` for a filter that knows no ways.
+    fn ways(&self) -> Option<RotationSystem> {
+        None
+    }
+    /// The vertex of each of the newest `places` places in the best map, the oldest first; `None` where it is not known.
+    fn path(&self, places: usize) -> Vec<Option<usize>>;
     /// Number of times that the filter needed a new vertex and its map was full.
     fn vertices_full(&self) -> u32;
+}
+
+/// A map with room for more vertices.
+fn widened<const V: usize>(map: &Map<V>) -> Map<VERTICES> {
+    let mut wide = Map::new();
+    for &label in map.labels() {
+        // The larger map has room for it.
+        let _ = wide.add_vertex(label);
+    }
+    map.edges().for_each(|(a, b)| wide.add_edge(a, b));
+    wide
 }
 
 /// Starts a filter for one path.
@@ -74,6 +92,10 @@ pub fn choose(settings: &Settings, explored: usize) -> Result<Start, EvaluationE
                 PriorSource::Exploration => explored,
             };
             robust::choose(config.hypotheses.into(), before * labels + settings.longest())
+        }
+        Filter::Ordered(config) => {
+            config.check().map_err(EvaluationError::Config)?;
+            Ok(ordered::start)
         }
     }
 }

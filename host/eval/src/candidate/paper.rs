@@ -9,7 +9,7 @@ use crate::{
 };
 use std::ptr;
 use toposlam::Filter as _;
-use toposlam::{FaultKind, Fingerprint, Map, Observation, PaperConfig, PaperFilter, Prior, VertexId};
+use toposlam::{FaultKind, Fingerprint, Map, Observation, PaperConfig, PaperFilter, Prior};
 
 /// Largest number of places of a path without a prior.
 pub(super) const MAX_PLACES: usize = 2048;
@@ -51,11 +51,11 @@ impl<const WORDS: usize> Particles<WORDS> {
     }
 
     /// The newest vertices that the best particle visited.
-    fn path(&self, places: usize) -> Vec<usize> {
+    fn path(&self, places: usize) -> Vec<Option<usize>> {
         let best = self.filter.best();
         let index = self.filter.particles().iter().position(|particle| ptr::eq(particle, best));
         let path = self.ancestry.path(index.unwrap_or(0));
-        path[path.len().saturating_sub(places)..].to_vec()
+        path[path.len().saturating_sub(places)..].iter().copied().map(Some).collect()
     }
 }
 
@@ -76,15 +76,11 @@ impl<const WORDS: usize> Candidate for Online<WORDS> {
 
     fn refine(&mut self, _steps: u32) {}
 
-    fn search_from(&self, _path: &[VertexId], _steps: u32) -> Option<(Map<VERTICES>, Vec<usize>)> {
-        None
-    }
-
     fn map(&self) -> Map<VERTICES> {
         *self.0.filter.map()
     }
 
-    fn path(&self, places: usize) -> Vec<usize> {
+    fn path(&self, places: usize) -> Vec<Option<usize>> {
         self.0.path(places)
     }
 
@@ -113,15 +109,11 @@ impl<const WORDS: usize> Candidate for Informed<WORDS> {
 
     fn refine(&mut self, _steps: u32) {}
 
-    fn search_from(&self, _path: &[VertexId], _steps: u32) -> Option<(Map<VERTICES>, Vec<usize>)> {
-        None
-    }
-
     fn map(&self) -> Map<VERTICES> {
         *self.particles.filter.map()
     }
 
-    fn path(&self, places: usize) -> Vec<usize> {
+    fn path(&self, places: usize) -> Vec<Option<usize>> {
         self.particles.path(places)
     }
 

@@ -1,9 +1,9 @@
 //! The robust filter as a candidate.
 
-use super::{Candidate, MAX_HYPOTHESES, Start, VERTICES};
+use super::{Candidate, MAX_HYPOTHESES, Start, VERTICES, widened};
 use crate::{
     settings::{EvaluationError, Filter, Settings},
-    trial::Trial,
+    trial::{Trial, Truth},
 };
 use toposlam::Filter as _;
 use toposlam::{FaultKind, Fingerprint, Map, Observation, RobustConfig, RobustFilter, VertexId};
@@ -47,27 +47,30 @@ impl<const N: usize, const HISTORY: usize> Candidate for Robust<N, HISTORY> {
         (0..steps).for_each(|_| self.0.refine());
     }
 
-    fn search_from(&self, path: &[VertexId], steps: u32) -> Option<(Map<VERTICES>, Vec<usize>)> {
+    fn search_from(&self, _: &Trial, truth: &Truth, steps: u32) -> Option<Box<dyn Candidate>> {
+        // The filter numbers vertices by first visit.
+        let mut seen = Vec::new();
+        let number = |class: &usize| {
+            let number = seen.iter().position(|known| known == class).unwrap_or_else(|| {
+                seen.push(*class);
+                seen.len() - 1
+            });
+            VertexId::new(u8::try_from(number).ok()?)
+        };
+        let path: Vec<VertexId> = truth.classes.iter().map(number).collect::<Option<_>>()?;
         let mut search = Self(self.0.clone());
-        search.0.assume_path(path)?;
+        search.0.assume_path(&path)?;
         search.refine(steps);
         search.0.refresh();
-        Some((search.map(), search.path(path.len())))
+        Some(Box::new(search))
     }
 
     fn map(&self) -> Map<VERTICES> {
-        let best = self.0.map();
-        let mut map = Map::new();
-        for &label in best.labels() {
-            // The larger map has room for it.
-            let _ = map.add_vertex(label);
-        }
-        best.edges().for_each(|(a, b)| map.add_edge(a, b));
-        map
+        widened(self.0.map())
     }
 
-    fn path(&self, places: usize) -> Vec<usize> {
-        let path: Vec<usize> = self.0.path().map(usize::from).collect();
+    fn path(&self, places: usize) -> Vec<Option<usize>> {
+        let path: Vec<Option<usize>> = self.0.path().map(|vertex| Some(vertex.index())).collect();
         path[path.len().saturating_sub(places)..].to_vec()
     }
 

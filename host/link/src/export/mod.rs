@@ -10,7 +10,7 @@
 //! use toposlam_link::topology::{TopologicalMap, Vertex};
 //!
 //! let place = |radius_mm| Vertex { radius_mm, visits: 3 };
-//! let map = TopologicalMap { vertices: vec![place(900), place(1200)], edges: vec![(0, 1)] };
+//! let map = TopologicalMap { vertices: vec![place(900), place(1200)], edges: vec![(0, 1)], ..Default::default() };
 //! let mut layout = Layout::new();
 //! layout.arrange(&map);
 //! let text = export::json(&map, layout.points(), Some(1));
@@ -35,7 +35,7 @@ pub(crate) mod sample {
     pub(crate) fn map() -> (TopologicalMap, Vec<Point>) {
         let radii_mm = [900, 1200, 640, 480];
         let vertices = radii_mm.map(|radius_mm| Vertex { radius_mm, visits: 7 }).to_vec();
-        let map = TopologicalMap { vertices, edges: vec![(0, 1), (0, 2), (1, 2), (2, 3), (3, 3)] };
+        let map = TopologicalMap { vertices, edges: vec![(0, 1), (0, 2), (1, 2), (2, 3), (3, 3)], ways: Vec::new() };
         let mut layout = Layout::new();
         layout.arrange(&map);
         let points = layout.points().to_vec();

@@ -8,9 +8,12 @@
 //! use toposlam_link::topology::{TopologicalMap, Vertex};
 //!
 //! let mut layout = Layout::new();
-//! layout.arrange(&TopologicalMap { vertices: vec![Vertex::default(); 3], edges: vec![(0, 1), (1, 2)] });
+//! let mut map = TopologicalMap { vertices: vec![Vertex::default(); 3], edges: vec![(0, 1), (1, 2)], ways: vec![] };
+//! layout.arrange(&map);
 //! let before = layout.points().to_vec();
-//! layout.arrange(&TopologicalMap { vertices: vec![Vertex::default(); 4], edges: vec![(0, 1), (0, 3), (1, 2), (2, 3)] });
+//! map.vertices.push(Vertex::default());
+//! map.edges = vec![(0, 1), (0, 3), (1, 2), (2, 3)];
+//! layout.arrange(&map);
 //! assert_eq!(layout.points()[..3], before);
 //! ```
 

@@ -14,7 +14,11 @@ type Edges = BTreeSet<(u8, u8)>;
 
 fn map(vertices: u8, edges: impl IntoIterator<Item = (u8, u8)>) -> TopologicalMap {
     let edges: Edges = edges.into_iter().map(|(a, b)| (a.min(b), a.max(b))).collect();
-    TopologicalMap { vertices: vec![Vertex::default(); vertices.into()], edges: edges.into_iter().collect() }
+    TopologicalMap {
+        vertices: vec![Vertex::default(); vertices.into()],
+        edges: edges.into_iter().collect(),
+        ways: Vec::new(),
+    }
 }
 
 fn is_sound(map: &TopologicalMap, points: &[Point]) -> bool {

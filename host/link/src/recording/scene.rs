@@ -179,7 +179,7 @@ mod tests {
     #[test]
     fn each_vertex_is_a_disc_of_its_radius_and_the_robots_vertex_is_highlighted() {
         let vertices = [1200, 0].map(|radius_mm| Vertex { radius_mm, visits: 1 }).to_vec();
-        let map = TopologicalMap { vertices, edges: vec![(0, 1), (1, 1)] };
+        let map = TopologicalMap { vertices, edges: vec![(0, 1), (1, 1)], ways: Vec::new() };
         let points = [Point { x: 0.0, y: 0.0 }, Point { x: 1.0, y: -1.0 }];
         let scene = Scene { map: &map, points: &points, robot: Some(1) };
         let entity = scene.update(5_000_000_001).entities.remove(0);

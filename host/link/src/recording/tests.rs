@@ -37,8 +37,8 @@ fn drive() -> Drive {
         turns.push(exploration.board().sent.clone());
         listener.feed(turns.last().unwrap(), |_, _| ());
     }
-    let map = exploration.robot().mapper().map();
-    Drive { map: TopologicalMap::from(map), digest: map_digest(map), turns }
+    let filter = exploration.robot().mapper().filter();
+    Drive { map: TopologicalMap::of(filter), digest: map_digest(filter.map(), filter.darts()), turns }
 }
 
 fn recorded(turns: &[Vec<u8>]) -> Vec<u8> {

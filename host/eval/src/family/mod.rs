@@ -1,11 +1,15 @@
-//! Families of random environments: planar graphs whose places share a few labels.
+//! Families of random environments: planar graphs whose places share a few labels, with their ways in the order in which they
+//! were drawn.
+
+mod drawing;
 
 use super::{
     environment::{Environment, Place},
     graph::Graph,
-    planar::{Point, draw_planar},
+    planar::draw_planar,
     walk::{PathRng, path_rng},
 };
+use drawing::Drawing;
 use rand::{RngExt, seq::SliceRandom};
 use std::{collections::BTreeSet, fmt, ops::RangeInclusive, str::FromStr};
 
@@ -26,6 +30,22 @@ pub enum Class {
     General,
     /// No place has two neighbours of one category, so the next label determines the next place.
     RightResolving,
+    /// As `General`, with parallel corridors, loops and dead ends, one of each at least.
+    Multigraph,
+}
+
+impl Class {
+    /// All classes, in the order of the documentation.
+    const ALL: [Self; 3] = [Self::General, Self::RightResolving, Self::Multigraph];
+
+    /// The name in reports and on the command line.
+    fn name(self) -> &'static str {
+        match self {
+            Self::General => "general",
+            Self::RightResolving => "right-resolving",
+            Self::Multigraph => "multigraph",
+        }
+    }
 }
 
 /// A family of random environments. Every range is sampled uniformly for each environment.
@@ -104,14 +124,11 @@ impl FromStr for Family {
             degree: range("DEGREE", degree, 1.0..=5.0, "a number or range A-B from 1 to 5")?,
             labels: range("LABELS", labels, 1..=MAX_LABELS, "a number or range A-B from 1 to 11")?,
             noise_m: range("NOISE", noise, 0.0..=1.0, "a number or range A-B of metres from 0 to 1")?,
-            class: match class.copied() {
-                None | Some("general") => Class::General,
-                Some("right-resolving") => Class::RightResolving,
-                Some(text) => {
-                    let allowed = "general or right-resolving";
-                    return Err(FamilyError::Field { name: "CLASS", text: text.into(), allowed });
-                }
-            },
+            class: class.map_or(Ok(Class::General), |text| {
+                let allowed = "general, right-resolving or multigraph";
+                let class = Class::ALL.into_iter().find(|class| class.name() == *text);
+                class.ok_or_else(|| FamilyError::Field { name: "CLASS", text: (*text).into(), allowed })
+            })?,
         })
     }
 }
@@ -146,10 +163,7 @@ impl fmt::Display for Family {
         let Self { seed, count, places, .. } = self;
         write!(f, "{seed},{count},{},{},", places.start(), places.end())?;
         write!(f, "{},{},{},", Span(&self.degree), Span(&self.labels), Span(&self.noise_m))?;
-        f.write_str(match self.class {
-            Class::General => "general",
-            Class::RightResolving => "right-resolving",
-        })
+        f.write_str(self.class.name())
     }
 }
 
@@ -173,11 +187,6 @@ impl Family {
     /// # Errors
     /// [`FamilyError::NoneFound`] when none of 1000 graphs had a valid assignment of categories.
     pub fn environment(&self, index: usize) -> Result<Environment, FamilyError> {
-        self.with_points(index).map(|(environment, _)| environment)
-    }
-
-    /// As [`Family::environment`], with where the places lie in the plane.
-    pub(super) fn with_points(&self, index: usize) -> Result<(Environment, Vec<Point>), FamilyError> {
         let mut rng = path_rng(self.seed, index as u64);
         for _ in 0..GRAPHS {
             let places = rng.random_range(self.places.clone());
@@ -191,9 +200,12 @@ impl Family {
                 Place { id, mean_mm: means_mm[category], sd_mm }
             };
             let places = (0..).zip(&categories).map(place).collect();
-            let edges: Vec<_> = graph.edges().iter().map(|&(a, b)| [a as u32, b as u32]).collect();
-            let environment = Environment::new(format!("{self} number {index}"), places, &edges);
-            return environment.map(|environment| (environment, points)).map_err(|_| FamilyError::NoneFound);
+            let mut drawing = Drawing::of_points(&graph, &points);
+            if self.class == Class::Multigraph && !drawing.extend(&mut rng) {
+                continue;
+            }
+            let environment = Environment::new(format!("{self} number {index}"), places, &drawing.edges);
+            return environment.and_then(|it| it.with_ways(&drawing.ways)).map_err(|_| FamilyError::NoneFound);
         }
         Err(FamilyError::NoneFound)
     }
@@ -203,7 +215,9 @@ impl Family {
         let neighbours = graph.neighbours();
         (0..ASSIGNMENTS).find_map(|_| {
             let categories = match self.class {
-                Class::General => (0..neighbours.len()).map(|_| rng.random_range(0..labels)).collect(),
+                Class::General | Class::Multigraph => {
+                    (0..neighbours.len()).map(|_| rng.random_range(0..labels)).collect()
+                }
                 Class::RightResolving => draw_right_resolving(&neighbours, labels, rng)?,
             };
             let all_occur = categories.iter().collect::<BTreeSet<_>>().len() == labels;
@@ -259,6 +273,7 @@ fn draw_means_mm(labels: usize, rng: &mut PathRng) -> Vec<f64> {
 mod tests {
     use super::*;
     use crate::equivalence::SmallestEquivalent;
+    use toposlam::WAYS_MAX;
 
     fn family(text: &str) -> Family {
         text.parse().unwrap()
@@ -316,6 +331,22 @@ mod tests {
     }
 
     #[test]
+    fn a_multigraph_has_loops_parallel_corridors_and_dead_ends_in_the_plane() {
+        let family = family("1,20,8,24,2-3,3-6,0.03-0.12,multigraph");
+        for index in 0..family.count {
+            let environment = family.environment(index).unwrap();
+            let corridors = environment.corridors();
+            assert!(corridors.iter().any(|(a, b)| a == b), "a loop");
+            let proper = corridors.iter().filter(|(a, b)| a != b).count();
+            let pairs = environment.graph().edges().iter().filter(|(a, b)| a != b).count();
+            assert!(proper > pairs, "a parallel corridor");
+            assert!(environment.exits().iter().any(|exits| exits.len() == 1), "a dead end");
+            assert!(environment.exits().iter().all(|exits| exits.len() <= WAYS_MAX));
+            assert_eq!(environment.rotation().unwrap().genus(), 0);
+        }
+    }
+
+    #[test]
     fn an_environment_depends_only_on_family_and_index() {
         let family_1 = family("1,2,8,14,2.5,4,0.05");
         assert_eq!(family_1.environment(1), family_1.environment(1));
@@ -335,7 +366,11 @@ mod tests {
 
     #[test]
     fn families_round_trip_through_text_and_invalid_fields_are_named() {
-        for text in ["1,20,8,14,2-3,3-6,0.03-0.06,right-resolving", "7,1,11,11,2.5,4,0.05,general"] {
+        for text in [
+            "1,20,8,14,2-3,3-6,0.03-0.06,right-resolving",
+            "7,1,11,11,2.5,4,0.05,general",
+            "1,2,40,60,2,3,0,multigraph",
+        ] {
             assert_eq!(family(text).to_string(), text);
         }
         assert!(refusal("1,2,3").starts_with("a family is SEED,COUNT,"));
@@ -346,7 +381,7 @@ mod tests {
         assert_eq!(refusal("1,20,8,9,3-2,3,0.03"), "DEGREE = 3-2: must be a number or range A-B from 1 to 5");
         assert_eq!(refusal("1,20,8,9,2,12,0.03"), "LABELS = 12: must be a number or range A-B from 1 to 11");
         assert_eq!(refusal("1,20,8,9,2,3,3-6"), "NOISE = 3-6: must be a number or range A-B of metres from 0 to 1");
-        assert_eq!(refusal("1,20,8,9,2,3,0.03,odd"), "CLASS = odd: must be general or right-resolving");
+        assert_eq!(refusal("1,20,8,9,2,3,0.03,odd"), "CLASS = odd: must be general, right-resolving or multigraph");
         let crowded = family("1,1,3,3,2,1,0.03").environment(0);
         assert_eq!(crowded, Err(FamilyError::NoneFound));
     }
