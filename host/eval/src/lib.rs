@@ -31,7 +31,6 @@ pub mod prior;
 pub mod range_csv;
 pub mod report;
 pub mod rotation;
-pub mod rotation_system;
 pub mod run;
 pub mod score;
 pub mod settings;

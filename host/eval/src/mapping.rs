@@ -33,7 +33,7 @@ use toposlam_sim::world::{Told, TrueMap};
 
 use crate::ancestry::Ancestry;
 use crate::graph::Graph;
-use crate::rotation_system::RotationSystem;
+use crate::rotation::RotationSystem;
 use crate::range_csv::{Ring, SONARS_MAX};
 use crate::score::{MapScore, score_map};
 
@@ -216,7 +216,11 @@ where
     let Some(darts) = mapper.filter().darts() else { return score };
     let mut is_driven = vec![false; truth.edges.len()];
     exploration.ground_truth().driven().into_iter().flatten().for_each(|(edge, _)| is_driven[edge] = true);
-    let exact = RotationSystem::of_map(darts).is_isomorphic_to(&RotationSystem::of_truth(truth, &is_driven));
+    let visited: Vec<usize> = (0..truth.nodes.len())
+        .filter(|&node| truth.ways(node).iter().any(|way| is_driven[way.edge]))
+        .collect();
+    let driven = RotationSystem::from(truth).part(&visited, |edge| is_driven[edge]);
+    let exact = RotationSystem::from(darts).is_isomorphic_to(&driven);
     MapScore { exact, isomorphic: exact, ..score }
 }
 
