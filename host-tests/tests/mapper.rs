@@ -3,7 +3,7 @@
 mod common;
 
 use common::notes::Notes;
-use toposlam::reference::{self, SONARS, VERTICES, paper};
+use toposlam::reference::{self, SONARS, VERTICES, ordered, paper, robust};
 use toposlam::wire::{
     Arrival, Belief, Capacities, Header, Hello, Location, MapReplica, Message, Reporter, ResetCause, Worst,
 };
@@ -45,13 +45,13 @@ fn the_filter_observes_radius_ways_and_exit() {
 }
 
 /// A listener to the whole run has what the filter believes, after every place.
-fn a_listener_has_what_the_filter_believes<F: Filter<VERTICES>>(settings: F::Config) {
-    let mut mapper = Box::new(Mapper::<SONARS, VERTICES, F>::new());
+fn a_listener_has_what_the_filter_believes<const V: usize, F: Filter<V>>(settings: F::Config) {
+    let mut mapper = Box::new(Mapper::<SONARS, V, F>::new());
     mapper.start(&config(settings)).unwrap();
     let mut reporter = Reporter::new();
-    let capacities = Capacities::of_mapper::<SONARS, VERTICES, F>(&config(settings));
+    let capacities = Capacities::of_mapper::<SONARS, V, F>(&config(settings));
     reporter.start(Hello::new(0, ResetCause::Unknown, 1, capacities), 100);
-    let mut replica = MapReplica::<VERTICES>::new();
+    let mut replica = MapReplica::<V>::new();
     let mut sequence = 0;
     let mut places = 0;
     for (frame, truth) in simulation() {
@@ -80,11 +80,16 @@ fn a_listener_has_what_the_filter_believes<F: Filter<VERTICES>>(settings: F::Con
 }
 
 #[test]
+fn a_listener_has_what_the_ordered_filter_believes() {
+    a_listener_has_what_the_filter_believes::<{ ordered::VERTICES }, ordered::Filter>(ordered::FILTER);
+}
+
+#[test]
 fn a_listener_has_what_the_robust_filter_believes() {
-    a_listener_has_what_the_filter_believes::<reference::Filter>(reference::FILTER);
+    a_listener_has_what_the_filter_believes::<{ robust::VERTICES }, robust::Filter>(robust::FILTER);
 }
 
 #[test]
 fn a_listener_has_what_the_paper_s_filter_believes() {
-    a_listener_has_what_the_filter_believes::<paper::Filter>(paper::FILTER);
+    a_listener_has_what_the_filter_believes::<{ paper::VERTICES }, paper::Filter>(paper::FILTER);
 }

@@ -1,7 +1,7 @@
 //! The reference robot: the capacities and settings of its firmware, of the bench, and of repetitions of a run on a host.
 //!
-//! The same frames give the same map on a host and on the robot, bit for bit. The reference robot has the robust filter;
-//! [`paper`] has its counterpart with the filter of the paper.
+//! The same frames give the same map on a host and on the robot, bit for bit. The reference robot has the ordered
+//! filter ([`ordered`]); [`robust`] and [`paper`] have the same robot with the other filters.
 //!
 //! ```
 //! use toposlam::place::PlaceDetector;
@@ -15,14 +15,16 @@
 //! # Ok::<(), toposlam::ConfigError>(())
 //! ```
 
+pub mod ordered;
 pub mod paper;
 pub mod robust;
+pub mod small;
 
 #[cfg(feature = "snapshot")]
-pub use robust::SNAPSHOT_BYTES;
-pub use robust::{FILTER, Filter, HISTORY, HYPOTHESES, MAPPER, RobotMapper, VERTICES};
+pub use ordered::SNAPSHOT_BYTES;
+pub use ordered::{DARTS, FILTER, Filter, HISTORY, HYPOTHESES, MAPPER, RobotMapper, VERTICES};
 #[cfg(feature = "wire")]
-pub use robust::{ROBOT, ReferenceRobot};
+pub use ordered::{ROBOT, ReferenceRobot};
 
 use crate::place::{PlaceConfig, PlaceDetector};
 use crate::ring::RingGeometry;

@@ -1,7 +1,7 @@
 //! The settings of a robot: those of its stages and of its main loop.
 
 use crate::drive::DriveConfig;
-use crate::filter::{Filter, RobustConfig};
+use crate::filter::{Filter, OrderedConfig};
 use crate::mapper::MapperConfig;
 use crate::persist::snapshot::SnapshotPolicy;
 use crate::ring::RingGeometry;
@@ -55,21 +55,21 @@ impl<const SONARS: usize, C: Copy> RobotConfig<SONARS, C> {
     }
 }
 
-impl<const SONARS: usize> RobotConfig<SONARS, RobustConfig> {
-    /// As [`RobotConfig::new`], for the robust filter with its defaults.
+impl<const SONARS: usize> RobotConfig<SONARS, OrderedConfig> {
+    /// As [`RobotConfig::new`], for the ordered filter with its defaults.
     ///
     /// ```
-    /// use toposlam::RobustFilter;
+    /// use toposlam::OrderedFilter;
     /// use toposlam::ring::RingGeometry;
     /// use toposlam::robot::{Robot, RobotConfig};
     ///
-    /// let mut robot = Box::new(Robot::<12, 16, RobustFilter<10, 16, 400>>::new());
+    /// let mut robot = Box::new(Robot::<12, 32, OrderedFilter<10, 32, 96, 200>>::new());
     /// robot.start(&RobotConfig::for_ring(RingGeometry::even()), &mut [])?;
     /// # Ok::<(), toposlam::ConfigError>(())
     /// ```
     #[must_use]
     pub const fn for_ring(geometry: RingGeometry<SONARS>) -> Self {
-        Self::new(geometry, RobustConfig::DEFAULT)
+        Self::new(geometry, OrderedConfig::DEFAULT)
     }
 }
 

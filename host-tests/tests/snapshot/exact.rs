@@ -1,7 +1,7 @@
 //! A restored filter continues exactly like the saved one, bit for bit.
 
 use super::*;
-use toposlam::reference;
+use toposlam::reference::robust;
 
 /// The number of places compared after a restore.
 const WATCHED: usize = 14;
@@ -95,9 +95,9 @@ fn a_smaller_buffer_holds_fewer_hypotheses_and_the_same_map() {
 
 #[test]
 fn the_reference_robot_s_buffer_has_room_for_every_hypothesis() {
-    let most = reference::Filter::SNAPSHOT_BYTES;
+    let most = robust::Filter::SNAPSHOT_BYTES;
     println!("snapshot of the reference robot: at most {most} bytes");
-    assert!(most <= reference::SNAPSHOT_BYTES);
+    assert!(most <= robust::SNAPSHOT_BYTES);
     let drive = &drives(500)[1];
     let mut filter = drive.start::<10, 16, 400>();
     let mut sizes = Vec::new();

@@ -1,7 +1,10 @@
 //! Snapshots of a mapper: other sections, and the start of a sequence after a restore.
 
 use toposlam::persist::snapshot::{Resume, Snapshot, SnapshotError, Writer};
-use toposlam::reference::{self, SONARS, VERTICES};
+use toposlam::reference::{
+    self, SONARS,
+    ordered::{self, VERTICES},
+};
 use toposlam::wire::map_digest;
 use toposlam::{Filter, Mapper, MapperConfig};
 use toposlam_sim::world::{Plan, RobotModel, Simulation};
@@ -73,14 +76,14 @@ fn sections_of_other_stages_are_preserved_and_skipped() {
 
 #[test]
 fn a_robot_restored_during_a_drive_ends_with_the_same_map() {
-    let mut buffer = [0; reference::SNAPSHOT_BYTES];
+    let mut buffer = [0; ordered::SNAPSHOT_BYTES];
     let mut simulation = simulation();
-    let mut mapper = started::<reference::Filter>(reference::FILTER);
+    let mut mapper = started::<ordered::Filter>(ordered::FILTER);
     drive(&mut mapper, &mut simulation, 40);
     let length = mapper.snapshot(&mut buffer).unwrap();
     // The detector of the restored mapper is empty, so the restore is between two places.
     let mut restored = mapper.clone();
-    restored.start(&reference::MAPPER).unwrap();
+    restored.start(&ordered::MAPPER).unwrap();
     restored.restore(&buffer[..length], Resume::InPlace).unwrap();
     assert_eq!(
         map_digest(restored.map(), restored.filter().darts()),

@@ -111,7 +111,7 @@ fn snapshots_match_the_tables() {
 fn the_specification_states_the_version_and_the_largest_snapshot() {
     for sentence in [
         format!("The snapshot version is {SNAPSHOT_VERSION}."),
-        format!("{} bytes for the reference robot", toposlam::reference::Filter::SNAPSHOT_BYTES),
+        format!("{} bytes for the reference robot", toposlam::reference::robust::Filter::SNAPSHOT_BYTES),
     ] {
         assert!(SPECIFICATION.contains(&sentence), "{sentence}");
     }

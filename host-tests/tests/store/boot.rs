@@ -124,7 +124,7 @@ fn an_invalid_snapshot_falls_back_to_the_previous_one() {
     assert_eq!(restored.filter().observed(), 20);
     // A snapshot of a filter with other capacities.
     let mut other = RobustOther::UNSTARTED;
-    other.start(reference::FILTER, 1).unwrap();
+    other.start(robust::FILTER, 1).unwrap();
     let mut buffer = [0; reference::SNAPSHOT_BYTES];
     let mut writer = Writer::new(&mut buffer).unwrap();
     writer.stage(&mut other).unwrap();

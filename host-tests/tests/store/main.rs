@@ -10,8 +10,9 @@ use common::environments::floor;
 use common::robot::{Hints, Robot};
 use toposlam::persist::snapshot::{Snapshot, Writer};
 use toposlam::persist::store::Store;
+use toposlam::reference::{self, robust};
 use toposlam::wire::map_digest;
-use toposlam::{Filter, RobustConfig, reference};
+use toposlam::{Filter, RobustConfig};
 use toposlam_sim::chip::FlashModel;
 
 /// The two last sectors of the reference robot's flash, and the pages of an nRF52840.
@@ -23,9 +24,9 @@ fn snapshots(places: usize, count: usize, every: usize) -> Vec<Vec<u8>> {
     let environment = floor();
     let hints = Hints { turn: true, degree: true, missing_percent: 10, wrong_percent: 2 };
     let mut robot = Robot::new(&environment, hints, 11);
-    let mut filter = Box::new(reference::Filter::new());
+    let mut filter = Box::new(robust::Filter::new());
     filter.start(RobustConfig::DEFAULT, 1).unwrap();
-    let mut restored = Box::new(reference::Filter::new());
+    let mut restored = Box::new(robust::Filter::new());
     let mut all = Vec::new();
     for _ in 0..places {
         filter.observe(robot.step());
@@ -35,7 +36,7 @@ fn snapshots(places: usize, count: usize, every: usize) -> Vec<Vec<u8>> {
             filter.observe(robot.step());
             filter.refine();
         }
-        let mut buffer = vec![0; reference::SNAPSHOT_BYTES];
+        let mut buffer = vec![0; robust::SNAPSHOT_BYTES];
         let mut writer = Writer::new(&mut buffer).unwrap();
         writer.stage(filter.as_mut()).unwrap();
         let length = writer.finish().unwrap();
@@ -49,7 +50,7 @@ fn snapshots(places: usize, count: usize, every: usize) -> Vec<Vec<u8>> {
 
 /// The newest snapshot of a store.
 fn newest<FLASH: embedded_storage::nor_flash::NorFlash>(store: &mut Store<FLASH>) -> Option<Vec<u8>> {
-    let mut buffer = vec![0; reference::SNAPSHOT_BYTES];
+    let mut buffer = vec![0; robust::SNAPSHOT_BYTES];
     let kept = store.newest(&mut buffer).unwrap()?;
     buffer.truncate(kept.length);
     Some(buffer)

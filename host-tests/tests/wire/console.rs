@@ -5,7 +5,8 @@ use std::cell::RefCell;
 use std::io::{self, Read, Write};
 use std::rc::Rc;
 use toposlam::RobustConfig;
-use toposlam::reference::{self, HYPOTHESES, RobotMapper, SONARS, VERTICES};
+use toposlam::reference::robust::{self, HYPOTHESES, RobotMapper, VERTICES};
+use toposlam::reference::{self, SONARS};
 use toposlam::wire::{
     Capacities, Command, Encoder, Hello, Inbox, Info, Message, Outcome, Refusal, Reporter, ResetCause, Settings,
     Staging, Version,
@@ -37,7 +38,7 @@ impl FakeRobot {
     pub(crate) fn new() -> Self {
         let plan = Plan::built_in("office").unwrap();
         let mut mapper = Box::new(RobotMapper::new());
-        mapper.start(&reference::MAPPER).unwrap();
+        mapper.start(&robust::MAPPER).unwrap();
         let mut reporter = Reporter::new();
         reporter.start(hello(), 100);
         Self {
@@ -113,7 +114,7 @@ impl FakeRobot {
                     said.push(*message);
                     Ok(())
                 });
-                self.mapper.start(&reference::MAPPER).map_err(|_| Refusal::OutOfRange)?;
+                self.mapper.start(&robust::MAPPER).map_err(|_| Refusal::OutOfRange)?;
                 self.reporter.start(hello(), 100);
             }
             Command::SetConfig(setting) => self.settings = self.settings.with(setting, HYPOTHESES, SONARS)?,
@@ -150,7 +151,7 @@ impl FakeRobot {
 }
 
 fn hello() -> Hello {
-    let capacities = Capacities::of_mapper::<SONARS, VERTICES, reference::Filter>(&reference::MAPPER);
+    let capacities = Capacities::of_mapper::<SONARS, VERTICES, robust::Filter>(&robust::MAPPER);
     Hello::new(0, ResetCause::Unknown, reference::SEED, capacities)
 }
 

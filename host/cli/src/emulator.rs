@@ -3,6 +3,7 @@
 //! QEMU's USART2 connects to the model of the sensor bus, USART1 to the caller. The emulated machine has no I2C, so the
 //! firmware reaches its sensors through the SC18IM700 bridge, with the same bytes as on a robot.
 
+pub mod microbit;
 mod stack;
 
 use std::{
@@ -277,9 +278,14 @@ impl Machine {
         for (option, line) in ["-serial", "-serial", "-monitor"].into_iter().zip(lines) {
             command.arg(option).arg(format!("tcp:{},nodelay=on", line.local_addr()?));
         }
-        command.arg("-kernel").arg(elf).stdin(Stdio::null()).stdout(Stdio::null());
-        let child = command.spawn().with_context(|| {
-            format!("starting the emulator {}; on Debian it is in the package qemu-system-arm", qemu.display())
+        command.arg("-kernel").arg(elf).stdout(Stdio::null());
+        Self::spawn(command)
+    }
+
+    fn spawn(mut command: Command) -> anyhow::Result<Self> {
+        let child = command.stdin(Stdio::null()).spawn().with_context(|| {
+            let program = Path::new(command.get_program());
+            format!("starting the emulator {}; on Debian it is in the package qemu-system-arm", program.display())
         })?;
         Ok(Self { child })
     }
@@ -307,9 +313,13 @@ impl Machine {
     }
 
     fn wait_for_exit(&mut self, deadline: Instant) -> anyhow::Result<Ending> {
+        self.wait_for_exit_status(deadline).map(Ending::Exited)
+    }
+
+    fn wait_for_exit_status(&mut self, deadline: Instant) -> anyhow::Result<ExitStatus> {
         loop {
             if let Some(status) = self.child.try_wait()? {
-                return Ok(Ending::Exited(status));
+                return Ok(status);
             }
             if Instant::now() >= deadline {
                 bail!("the emulator closed its lines but did not end");

@@ -305,7 +305,7 @@ fn maps_with_loops_and_parallel_edges_are_exact_by_their_ways() {
         assert_eq!(report["settings"]["filters"]["ordered"]["wrong_exit"], json!(0.04));
         let row = &report["rows"][1];
         assert_eq!((&row["filter"], &row["paths_not_exhaustive"]), (&json!("ordered"), &json!(0)), "{walk}");
-        for key in ["exact", "isomorphic", "edge_f1"] {
+        for key in ["exact", "exact_edges", "isomorphic", "edge_f1"] {
             assert_eq!(row[key], json!(1.0), "{walk}: {key}");
         }
         assert_eq!((&row["vertices"], &row["limit"]), (&json!({ "3": 5 }), &json!(0.0)), "{walk}");

@@ -209,6 +209,7 @@ mod tests {
             length: 50,
             exact: 0.5,
             exact_interval: [0.2, 0.8],
+            exact_edges: None,
             isomorphic: 0.5,
             vertices: vertices.iter().copied().collect(),
             edge_f1: 0.9,

@@ -4,7 +4,7 @@ use super::{
     candidate::{Candidate, Start, VERTICES, prior_table},
     graph::Graph,
     prior::PriorSource,
-    score::{MapScore, has_the_same_ways, is_localised, score_map_from},
+    score::{MapScore, has_the_same_edges, has_the_same_ways, is_localised, score_map_from},
     settings::Settings,
     trial::{Trial, Truth},
 };
@@ -32,6 +32,9 @@ pub struct PathResult {
 pub struct Judgement {
     /// The score of the map.
     pub score: MapScore,
+    /// Whether the vertices and the edges are right, whatever the order of the ways; `None` for a map that is not judged by its
+    /// ways.
+    pub exact_edges: Option<bool>,
     /// How many vertices the map has.
     pub vertices: usize,
     /// The share of the places so far at which the best hypothesis of that moment was localised.
@@ -83,12 +86,13 @@ pub fn judge(trial: &Trial, settings: &Settings, start: Start) -> PathResult {
             continue;
         }
         let truth = trial.truth(steps);
-        let score = score(&*candidate, &truth, before);
+        let (score, exact_edges) = score(&*candidate, &truth, before);
         exact_from = score.exact.then(|| exact_from.unwrap_or(steps));
         if let Some(check_point) = check_point {
             let map = candidate.map();
             judgements.push(Judgement {
                 score,
+                exact_edges,
                 vertices: map.vertices().len(),
                 localised_share: localised[check_point] as f64 / steps as f64,
                 consistency_mm: distance_mm(&map, steps),
@@ -102,16 +106,21 @@ pub fn judge(trial: &Trial, settings: &Settings, start: Start) -> PathResult {
     PathResult { exhaustive: trial.walk.exhaustive, judgements, vertices_full, prior_time }
 }
 
-/// Scores the map of a filter. Places that the filter has forgotten do not count.
-fn score(candidate: &dyn Candidate, truth: &Truth, before: usize) -> MapScore {
+/// Scores the map of a filter, and whether it has the right vertices and edges without regard to the order of the ways. Places that
+/// the filter has forgotten do not count.
+fn score(candidate: &dyn Candidate, truth: &Truth, before: usize) -> (MapScore, Option<bool>) {
     let path = candidate.path(truth.classes.len());
     let known = |(&vertex, &class): (&Option<usize>, &usize)| Some((vertex?, class));
     let first = path.iter().take(before).flatten().count();
     let (path, classes): (Vec<usize>, Vec<usize>) = path.iter().zip(&truth.classes).filter_map(known).unzip();
     let score = score_map_from(&graph_of(&candidate.map()), &path, &truth.graph, &classes, first);
     match (&truth.rotation, candidate.ways()) {
-        (Some(truth), Some(ways)) => MapScore { exact: has_the_same_ways(&ways, &path, truth, &classes), ..score },
-        _ => score,
+        (Some(truth), Some(ways)) => {
+            let exact = has_the_same_ways(&ways, &path, truth, &classes);
+            let exact_edges = has_the_same_edges(&ways, &path, truth, &classes);
+            (MapScore { exact, ..score }, Some(exact_edges))
+        }
+        _ => (score, None),
     }
 }
 
@@ -128,7 +137,7 @@ fn leaves_truth(candidate: &dyn Candidate, trial: &Trial, truth: &Truth, steps: 
         return None;
     }
     let found = candidate.search_from(trial, truth, steps)?;
-    Some(!score(&*found, truth, trial.places_before()).exact)
+    Some(!score(&*found, truth, trial.places_before()).0.exact)
 }
 
 fn graph_of(map: &Map<VERTICES>) -> Graph {

@@ -22,19 +22,20 @@
 
 use toposlam::persist::Persist;
 use toposlam::place::Place;
-use toposlam::reference::{self, VERTICES, paper};
+use toposlam::reference::robust::{self, VERTICES};
+use toposlam::reference::{self, paper};
 use toposlam::ring::{RingFrame, RingGeometry};
-use toposlam::{ConfigError, FaultCounters, Filter, Map, Mapper, MapperConfig, Passage, Update};
+use toposlam::{ConfigError, Darts, FaultCounters, Filter, Map, Mapper, MapperConfig, Passage, Update};
 
 use toposlam::wire::FilterSettings;
 use toposlam_sim::Step;
 use toposlam_sim::exploration::Exploration;
-use toposlam_sim::world::{Told, TrueMap};
+use toposlam_sim::world::{GroundTruth, Told, TrueMap};
 
 use crate::ancestry::Ancestry;
 use crate::graph::Graph;
-use crate::rotation::RotationSystem;
 use crate::range_csv::{Ring, SONARS_MAX};
+use crate::rotation::RotationSystem;
 use crate::score::{MapScore, score_map};
 
 /// The filter of a mapping, with the settings of the reference robot.
@@ -57,7 +58,7 @@ trait Stages<const SONARS: usize> {
 }
 
 /// The stages with the robust filter.
-struct Robust<const SONARS: usize>(Box<Mapper<SONARS, VERTICES, reference::Filter>>);
+struct Robust<const SONARS: usize>(Box<Mapper<SONARS, VERTICES, robust::Filter>>);
 
 impl<const SONARS: usize> Stages<SONARS> for Robust<SONARS> {
     fn observe(&mut self, frame: &RingFrame<SONARS>, passage: Passage) -> Option<(Place, Update)> {
@@ -133,7 +134,7 @@ impl Mapping<SONARS_MAX> {
 impl<const SONARS: usize> Mapping<SONARS> {
     fn start(geometry: RingGeometry<SONARS>, filter: FilterChoice) -> Result<Self, ConfigError> {
         let stages: Box<dyn Stages<SONARS>> = match filter {
-            FilterChoice::Robust => Box::new(Robust(started(geometry, reference::FILTER)?)),
+            FilterChoice::Robust => Box::new(Robust(started(geometry, robust::FILTER)?)),
             FilterChoice::Paper => Box::new(Paper(started(geometry, paper::FILTER)?, Ancestry::new())),
         };
         Ok(Self { stages, steps: Vec::new() })
@@ -214,14 +215,20 @@ where
     let truth = exploration.rover().true_map();
     let score = score_path(mapper.map(), &exploration.path(), truth, exploration.nodes());
     let Some(darts) = mapper.filter().darts() else { return score };
-    let mut is_driven = vec![false; truth.edges.len()];
-    exploration.ground_truth().driven().into_iter().flatten().for_each(|(edge, _)| is_driven[edge] = true);
-    let visited: Vec<usize> = (0..truth.nodes.len())
-        .filter(|&node| truth.ways(node).iter().any(|way| is_driven[way.edge]))
-        .collect();
-    let driven = RotationSystem::from(truth).part(&visited, |edge| is_driven[edge]);
-    let exact = RotationSystem::from(darts).is_isomorphic_to(&driven);
+    let exact = has_driven_ways(darts, exploration.ground_truth());
     MapScore { exact, isomorphic: exact, ..score }
+}
+
+/// Whether a map has the driven edges, in the order of the ways of the true map and up to a symmetry of the building. Frontiers do
+/// not count.
+pub fn has_driven_ways(darts: Darts<'_>, ground_truth: &GroundTruth) -> bool {
+    let truth = ground_truth.true_map();
+    let mut is_driven = vec![false; truth.edges.len()];
+    ground_truth.driven().into_iter().flatten().for_each(|(edge, _)| is_driven[edge] = true);
+    let is_visited = |node: &usize| truth.ways(*node).iter().any(|way| is_driven[way.edge]);
+    let visited: Vec<usize> = (0..truth.nodes.len()).filter(is_visited).collect();
+    let driven = RotationSystem::from(truth).part(&visited, |edge| is_driven[edge]);
+    RotationSystem::from(darts).is_isomorphic_to(&driven)
 }
 
 fn started<const SONARS: usize, F: Filter<VERTICES>>(

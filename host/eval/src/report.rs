@@ -190,6 +190,10 @@ pub struct Row {
     /// The 95 % confidence interval of [`Row::exact`] (Wilson), for independent paths. Where several paths share a
     /// random environment, it is too narrow for the class of environments.
     pub exact_interval: [f64; 2],
+    /// The share of maps that have the right vertices and edges, whatever the order of the ways; absent for maps that are not
+    /// judged by their ways.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub exact_edges: Option<f64>,
     /// The share of maps that are isomorphic to the truth, regardless of labels.
     pub isomorphic: f64,
     /// Number of maps for each number of vertices (the paper's Fig. 5).
@@ -278,8 +282,11 @@ fn row(case: &Case, settings: &Settings, results: &[PathResult], check_point: us
     let length = settings.lengths[check_point];
     let filter_time: Duration = judged().map(|judgement| judgement.filter_time).sum();
     let prior_time: Duration = results.iter().map(|result| result.prior_time).sum();
-    let limits: Vec<bool> = judged().filter_map(|judgement| judgement.leaves_truth).collect();
-    let limit = limits.iter().filter(|&&left_truth| left_truth).count() as f64 / limits.len() as f64;
+    let share = |value: fn(&Judgement) -> Option<bool>| {
+        let values: Vec<bool> = judged().filter_map(value).collect();
+        let hits = values.iter().filter(|&&value| value).count();
+        (!values.is_empty()).then(|| hits as f64 / values.len() as f64)
+    };
     let missed = results.iter().filter(|result| !result.exhaustive).count();
     Row {
         name: case.name.clone(),
@@ -290,6 +297,7 @@ fn row(case: &Case, settings: &Settings, results: &[PathResult], check_point: us
         length,
         exact,
         exact_interval: wilson(exact, results.len()),
+        exact_edges: share(|judgement| judgement.exact_edges),
         isomorphic: mean(|judgement| f64::from(u8::from(judgement.score.isomorphic))),
         vertices,
         edge_f1: mean(|judgement| judgement.score.edge_f1),
@@ -300,11 +308,14 @@ fn row(case: &Case, settings: &Settings, results: &[PathResult], check_point: us
         places_until_exact: Distribution::of_reached(judged().map(|judgement| judgement.exact_from)),
         paths_not_exhaustive: if settings.longest() >= EXHAUSTIVE_FROM_LENGTH { missed } else { 0 },
         vertices_full: results.iter().map(|result| u64::from(result.vertices_full)).sum(),
-        limit: (!limits.is_empty()).then_some(limit),
+        limit: share(|judgement| judgement.leaves_truth),
         prior_seconds: prior_time.as_secs_f64() / results.len() as f64,
         seconds_per_place: filter_time.as_secs_f64() / (results.len() * length) as f64,
     }
 }
+
+/// A column of the table that only some evaluations have.
+type Column = (&'static str, fn(&Row) -> Option<f64>);
 
 impl fmt::Display for Report {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
@@ -326,10 +337,10 @@ impl fmt::Display for Report {
         writeln!(f)?;
         let width = self.rows.iter().map(|row| row.name.chars().count()).max().unwrap_or(0).max("name".len());
         write!(f, "{:<width$} {:<7}{:>6}{:>6}{:>7} {:<12}", "name", "filter", "paths", "T", "exact", "95 %")?;
-        let has_limit = self.rows.iter().any(|row| row.limit.is_some());
-        if has_limit {
-            write!(f, "{:>6}", "left")?;
-        }
+        let columns: [Column; 2] = [("left", |row| row.limit), ("edges", |row| row.exact_edges)];
+        let shown = |column: &&Column| self.rows.iter().any(|row| column.1(row).is_some());
+        let columns: Vec<&Column> = columns.iter().filter(shown).collect();
+        columns.iter().try_for_each(|(name, _)| write!(f, "{name:>6}"))?;
         writeln!(
             f,
             "{:>6}{:>9}{:>8}{:>10}{:>15}{:>14}{:>10}  vertices: maps",
@@ -340,9 +351,9 @@ impl fmt::Display for Report {
             let interval = format!("{low:.3}-{high:.3}");
             write!(f, "{:<width$} {:<7}{:>6}{:>6}", row.name, row.filter, row.paths, row.length)?;
             write!(f, "{:>7.3} {interval:<12}", row.exact)?;
-            if has_limit {
-                let left = row.limit.map_or("-".to_owned(), |share| format!("{share:.3}"));
-                write!(f, "{left:>6}")?;
+            for (_, share) in &columns {
+                let share = share(row).map_or("-".to_owned(), |share| format!("{share:.3}"));
+                write!(f, "{share:>6}")?;
             }
             write!(f, "{:>6.3}{:>9.3}", row.isomorphic, row.edge_f1)?;
             write!(f, "{:>8.3}{:>10.3}", row.location_online, row.location_smoothed)?;

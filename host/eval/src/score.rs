@@ -63,10 +63,32 @@ pub fn score_map_from(map: &Graph, path: &[usize], truth: &Graph, classes: &[usi
 /// # Panics
 /// As [`score_map`].
 pub fn has_the_same_ways(map: &RotationSystem, path: &[usize], truth: &RotationSystem, classes: &[usize]) -> bool {
+    image(map, path, truth, classes).is_some_and(|image| truth.equals(map, &image))
+}
+
+/// As [`has_the_same_ways`], without regard to the order of the ways: each edge once between the right vertices.
+///
+/// # Panics
+/// As [`score_map`].
+pub fn has_the_same_edges(map: &RotationSystem, path: &[usize], truth: &RotationSystem, classes: &[usize]) -> bool {
+    let Some(image) = image(map, path, truth, classes) else { return false };
+    let ends = |system: &RotationSystem, number: &dyn Fn(usize) -> usize| {
+        let pair = |edge| {
+            let (a, b) = (number(system.vertex(2 * edge)), number(system.vertex(2 * edge + 1)));
+            (a.min(b), a.max(b))
+        };
+        let mut pairs: Vec<(usize, usize)> = (0..system.dart_count() / 2).map(pair).collect();
+        pairs.sort_unstable();
+        pairs
+    };
+    map.vertex_count() == truth.vertex_count() && ends(truth, &|class| image[class]) == ends(map, &|vertex| vertex)
+}
+
+/// The vertex of each class; `None` if a class has none.
+fn image(map: &RotationSystem, path: &[usize], truth: &RotationSystem, classes: &[usize]) -> Option<Vec<usize>> {
     let class_of_vertex = majority_classes(map.vertex_count(), truth.vertex_count(), path, classes);
     let vertex_of = |class| class_of_vertex.iter().position(|&other| other == Some(class));
-    let image: Option<Vec<usize>> = (0..truth.vertex_count()).map(vertex_of).collect();
-    image.is_some_and(|image| truth.equals(map, &image))
+    (0..truth.vertex_count()).map(vertex_of).collect()
 }
 
 /// Whether the last vertex of a path represents the class of the robot, judged only by the path so far.
@@ -169,6 +191,14 @@ mod tests {
         // The tail is at another vertex.
         let wrong = RotationSystem::new(vec![vec![2, 5, 7], vec![6], vec![0, 3], vec![1, 4]]);
         assert!(!has_the_same_ways(&wrong, &path, &truth, &CLASSES));
+        assert!(!has_the_same_edges(&wrong, &path, &truth, &CLASSES));
+        // The tail leaves on the other side of the triangle.
+        let mirrored = RotationSystem::new(vec![vec![2, 5], vec![6], vec![0, 3], vec![4, 1, 7]]);
+        assert!(!has_the_same_ways(&mirrored, &path, &truth, &CLASSES));
+        assert!(has_the_same_edges(&mirrored, &path, &truth, &CLASSES));
+        // A second edge between two vertices.
+        let doubled = RotationSystem::new(vec![vec![2, 5, 8], vec![6], vec![0, 9, 3], vec![1, 4, 7]]);
+        assert!(!has_the_same_edges(&doubled, &path, &truth, &CLASSES));
     }
 
     #[test]

@@ -83,16 +83,16 @@ impl Board for MemoryBoard {
     }
 }
 
-/// A robot with the ring of the reference robot and any filter, its world and the ground truth of its drive.
-pub struct Exploration<'buffer, const V: usize = VERTICES, F: Filter<V> = reference::Filter> {
+/// A robot with any filter and a ring of 4, 8 or 16 sensors, its world and the ground truth of its drive.
+pub struct Exploration<'buffer, const V: usize = VERTICES, F: Filter<V> = reference::Filter, const S: usize = SONARS> {
     rover: Rover,
-    robot: Box<Robot<'buffer, SONARS, V, F>>,
+    robot: Box<Robot<'buffer, S, V, F>>,
     board: MemoryBoard,
     encoder: Encoder,
     requests: u16,
     ring_faults: FaultCounters,
     /// The fault injectors of the frames and the received bytes, when faults are enabled.
-    injectors: Option<(RingInjector, LineInjector)>,
+    injectors: Option<(RingInjector<S>, LineInjector)>,
     ground_truth: GroundTruth,
     nodes: Vec<Option<usize>>,
     steps: Vec<Step>,
@@ -114,7 +114,7 @@ impl<'buffer> Exploration<'buffer> {
     }
 }
 
-impl<'buffer, const V: usize, F> Exploration<'buffer, V, F>
+impl<'buffer, const V: usize, F, const S: usize> Exploration<'buffer, V, F, S>
 where
     F: Filter<V, Config: FilterSettings> + Persist,
 {
@@ -129,7 +129,7 @@ where
         plan: &Plan,
         model: RobotModel,
         seed: u64,
-        config: &RobotConfig<SONARS, F::Config>,
+        config: &RobotConfig<S, F::Config>,
         buffer: &'buffer mut [u8],
     ) -> Result<Self, VoronoiError> {
         let rover = Rover::new(plan, model, BodyModel::default(), seed)?;
@@ -158,14 +158,14 @@ where
     }
 
     /// Returns the next frame of the world. [`Exploration::map`] must follow.
-    pub fn frame(&mut self) -> RingFrame<SONARS> {
+    pub fn frame(&mut self) -> RingFrame<S> {
         let (frame, truth) = self.rover.frame();
         self.ground_truth.drive(&truth);
         frame
     }
 
     /// Runs one turn of the robot's main loop with a frame, which a fault may have changed.
-    pub fn map(&mut self, frame: &RingFrame<SONARS>) -> Seen {
+    pub fn map(&mut self, frame: &RingFrame<S>) -> Seen {
         self.board.now_ms = self.board.now_ms.wrapping_add(FRAME_MS);
         self.frames += 1;
         let passage = self.robot.drive().passage();
@@ -225,12 +225,12 @@ where
     }
 
     /// The robot.
-    pub const fn robot(&self) -> &Robot<'buffer, SONARS, V, F> {
+    pub const fn robot(&self) -> &Robot<'buffer, S, V, F> {
         &self.robot
     }
 
     /// The robot, for restoring or restarting it.
-    pub const fn robot_mut(&mut self) -> &mut Robot<'buffer, SONARS, V, F> {
+    pub const fn robot_mut(&mut self) -> &mut Robot<'buffer, S, V, F> {
         &mut self.robot
     }
 

@@ -13,6 +13,8 @@ pub(super) struct SentWays {
 }
 
 impl SentWays {
+    /// What a reporter holds before it is started: all zero.
+    pub(super) const UNSET: Self = Self { checksum: 0, leads_to: [0; WAYS_MAX] };
     /// No way.
     pub(super) const NONE: Self = Self { checksum: 0, leads_to: [Self::NOWHERE; WAYS_MAX] };
     const NOWHERE: u8 = u8::MAX;

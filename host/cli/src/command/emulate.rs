@@ -1,4 +1,5 @@
-//! `toposlam emulate`: the exploration of `simulate`, with mapping and drive in the firmware on an emulated STM32F405.
+//! `toposlam emulate`: the exploration of `simulate`, with mapping and drive in the firmware on an emulated STM32F405, or the small
+//! robot on an emulated Cortex-M0.
 
 use std::{
     ops::ControlFlow,
@@ -9,11 +10,11 @@ use std::{
 };
 
 use anyhow::{Context, bail, ensure};
-use clap::Args;
+use clap::{Args, ValueEnum};
 use toposlam::Filter;
 use toposlam::drive::VelocityCommand;
 use toposlam::persist::Persist;
-use toposlam::reference::{SONARS, paper, robust};
+use toposlam::reference::{SONARS, ordered, paper, robust};
 use toposlam::robot::RobotConfig;
 use toposlam::wire::{Belief, Evidence, FilterSettings, Location, Message, Worst};
 use toposlam_cli::emulator::Emulation;
@@ -22,6 +23,7 @@ use toposlam_sim::exploration::Exploration;
 use toposlam_sim::injector::FaultRates;
 
 use super::drive::{DriveArguments, Summary, fault_rate};
+use super::emulate_small;
 use super::filter::FilterArgument;
 use super::hardship;
 use super::received::Received;
@@ -29,32 +31,42 @@ use super::received::Received;
 /// Directory of the images built by `cargo firmware`.
 const IMAGES: &str = "thumbv7em-none-eabihf/firmware";
 /// The filter of the reference robot, whose image is `robot`.
-const REFERENCE: FilterArgument = FilterArgument::Robust;
+const REFERENCE: FilterArgument = FilterArgument::Ordered;
 
 /// Arguments of `toposlam emulate`.
 #[derive(Args)]
 pub(crate) struct Arguments {
     #[command(flatten)]
-    drive: DriveArguments,
+    pub(super) drive: DriveArguments,
     /// Stop after this many detected places.
     #[arg(long, default_value_t = 30)]
-    places: usize,
+    pub(super) places: usize,
+    /// The robot: `reference`, or `small` with a ring of eight and 16 KiB of RAM (docs/small-robot.md).
+    #[arg(long, value_enum, default_value_t = RobotArgument::Reference)]
+    robot: RobotArgument,
     /// Filter of the firmware; each one has an image of its own.
     #[arg(long, value_enum, default_value_t = REFERENCE)]
     filter: FilterArgument,
     /// Firmware image with this filter [default: built with `cargo firmware`].
     #[arg(long, value_name = "FILE")]
-    elf: Option<PathBuf>,
+    pub(super) elf: Option<PathBuf>,
     /// Emulator to run.
     #[arg(long, value_name = "PROGRAM", default_value = "qemu-system-arm")]
-    qemu: PathBuf,
+    pub(super) qemu: PathBuf,
     /// Timeout of the whole run, in seconds.
     #[arg(long, value_name = "SECONDS", default_value_t = 800)]
-    timeout_s: u64,
+    pub(super) timeout_s: u64,
     /// Fault rate of the sensor bus and the line, 0 to 1: the probability that a bus transfer fails. Every other rate is proportional to
     /// it (docs/faults.md). With faults, the map is compared with the ground truth and not with that of `simulate`.
     #[arg(long, value_name = "RATE", default_value_t = 0.0, value_parser = fault_rate)]
     faults: f64,
+}
+
+/// The robot that is emulated.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+enum RobotArgument {
+    Reference,
+    Small,
 }
 
 /// Timeout of the firmware's velocity command.
@@ -67,16 +79,26 @@ struct Repetition<'buffer, const V: usize, F: Filter<V>> {
 }
 
 pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
+    if arguments.robot == RobotArgument::Small {
+        ensure!(arguments.faults == 0.0, "faults are emulated with the reference robot only");
+        ensure!(arguments.filter == REFERENCE, "the small robot has one filter");
+        return emulate_small::run(arguments);
+    }
     if arguments.faults > 0.0 {
         ensure!(arguments.filter == REFERENCE, "faults are emulated with the filter of the reference robot only");
         let rates = FaultRates::scaled(arguments.faults);
         return hardship::run(&arguments.drive, emulation(arguments, "robot")?, arguments.places, rates);
     }
     match arguments.filter {
-        FilterArgument::Ordered => anyhow::bail!("not yet"),
-        FilterArgument::Robust => compare_with::<{ robust::VERTICES }, robust::Filter>(
+        FilterArgument::Ordered => compare_with::<{ ordered::VERTICES }, ordered::Filter>(
             arguments,
             emulation(arguments, "robot")?,
+            &ordered::ROBOT,
+            &mut [0; ordered::SNAPSHOT_BYTES],
+        ),
+        FilterArgument::Robust => compare_with::<{ robust::VERTICES }, robust::Filter>(
+            arguments,
+            emulation(arguments, "robot_robust")?,
             &robust::ROBOT,
             &mut [0; robust::SNAPSHOT_BYTES],
         ),

@@ -1,5 +1,6 @@
 //! `toposlam evaluate`: the rate of exact maps over many random paths through known environments.
 
+use super::filter::FilterArgument;
 use anyhow::{Context, ensure};
 use clap::{Args, ValueEnum};
 use std::{
@@ -114,7 +115,7 @@ struct CourseArguments {
 struct FilterArguments {
     /// Filter to evaluate [default: ordered with hints of ways, otherwise robust].
     #[arg(long)]
-    filter: Option<FilterName>,
+    filter: Option<FilterArgument>,
     /// Hypotheses (robust) or particles (paper), 1 to 100 [default: 10]. The ordered filter has 10.
     #[arg(long, alias = "particles", value_name = "N")]
     hypotheses: Option<u8>,
@@ -158,26 +159,6 @@ struct FilterArguments {
     /// Paper: phi of Eq. 9, 0 to 1 in steps of 0.001 [default: 0.1].
     #[arg(long, value_name = "PHI", value_parser = permille)]
     penalty: Option<u16>,
-}
-
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-enum FilterName {
-    /// Ordered filter: maps the ways of each place in their order.
-    Ordered,
-    /// Robust filter.
-    Robust,
-    /// Filter of the paper.
-    Paper,
-}
-
-impl FilterName {
-    fn option(self) -> &'static str {
-        match self {
-            Self::Ordered => "ordered",
-            Self::Robust => "robust",
-            Self::Paper => "paper",
-        }
-    }
 }
 
 #[derive(Clone, Copy, ValueEnum)]
@@ -229,7 +210,7 @@ fn permille(text: &str) -> Result<u16, String> {
 }
 
 pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
-    let default = if arguments.course.hints.ways { FilterName::Ordered } else { FilterName::Robust };
+    let default = if arguments.course.hints.ways { FilterArgument::Ordered } else { FilterArgument::Robust };
     let filters = arguments.filter.chosen(default, arguments.plot.is_some())?;
     let evaluations =
         filters.iter().map(|&filter| arguments.course.settings(filter)).collect::<anyhow::Result<Vec<_>>>()?;
@@ -348,10 +329,10 @@ impl CourseArguments {
 
 impl FilterArguments {
     /// The selected filter or the default; for a comparison the default and the paper's filter.
-    fn chosen(&self, default: FilterName, compares: bool) -> anyhow::Result<Vec<Filter>> {
-        use FilterName::{Ordered, Paper, Robust};
+    fn chosen(&self, default: FilterArgument, compares: bool) -> anyhow::Result<Vec<Filter>> {
+        use FilterArgument::{Ordered, Paper, Robust};
         let names = if compares { vec![default, Paper] } else { vec![self.filter.unwrap_or(default)] };
-        let parameters: [(&str, bool, &[FilterName]); 14] = [
+        let parameters: [(&str, bool, &[FilterArgument]); 14] = [
             ("--hypotheses", self.hypotheses.is_some(), &[Robust, Paper]),
             ("--noise-mm", self.noise_mm.is_some(), &[Ordered, Robust]),
             ("--moves", self.moves.is_some(), &[Robust]),
@@ -369,9 +350,11 @@ impl FilterArguments {
         ];
         for (parameter, is_given, filters) in parameters {
             let is_used = names.iter().any(|name| filters.contains(name));
-            ensure!(!is_given || is_used, "{parameter} needs --filter {}", filters[0].option());
+            let filter = filters[0].to_possible_value();
+            let filter = filter.as_ref().map_or("", |filter| filter.get_name());
+            ensure!(!is_given || is_used, "{parameter} needs --filter {filter}");
         }
-        let filter = |name: &FilterName| match name {
+        let filter = |name: &FilterArgument| match name {
             Ordered => self.ordered(),
             Robust => self.robust(),
             Paper => self.paper(),

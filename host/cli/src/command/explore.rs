@@ -2,12 +2,12 @@
 
 use anyhow::ensure;
 use clap::Args;
+use toposlam::Filter;
 use toposlam::drive::GoalStatus;
 use toposlam::persist::Persist;
-use toposlam::reference::{SONARS, paper, robust};
+use toposlam::reference::{SONARS, ordered, paper, robust};
 use toposlam::robot::RobotConfig;
 use toposlam::wire::{Command, FilterSettings};
-use toposlam::{Filter, OrderedConfig, OrderedFilter};
 use toposlam_eval::mapping::score_exploration;
 use toposlam_eval::parallel;
 use toposlam_sim::exploration::Exploration;
@@ -17,32 +17,13 @@ use toposlam_sim::world::{HintReport, Plan, Report, RobotModel, Told};
 use super::drive::{fault_rate, load_plan, noise_factor, number_in};
 use super::filter::FilterArgument;
 
-type Ordered = OrderedFilter<10, 64, 192, 320>;
-const ORDERED: RobotConfig<SONARS, OrderedConfig> = RobotConfig::new(toposlam::reference::RING, OrderedConfig::DEFAULT);
-
-fn ordered() -> RobotConfig<SONARS, OrderedConfig> {
-    let mut robot = ORDERED;
-    let set = |name: &str, slot: &mut u16| {
-        if let Ok(value) = std::env::var(name) {
-            *slot = value.parse().unwrap();
-        }
-    };
-    let config = &mut robot.mapper.filter;
-    set("TRAVEL", &mut config.travel_noise_permille);
-    set("BEARING", &mut config.bearing_noise_mrad);
-    set("EXIT", &mut config.wrong_exit_permille);
-    set("MISSED", &mut config.missed_way_permille);
-    set("FALSE", &mut config.false_way_permille);
-    robot
-}
-
 /// Timeout of a goal, in ring frames.
 const FRAMES_PER_JOURNEY: u64 = 20_000;
 
 /// Arguments of `toposlam explore`.
 #[derive(Args)]
 pub(crate) struct Arguments {
-    /// Floor plans: ring, office, flat, or files.
+    /// Floor plans: ring, office, flat, grid, plus, comb, ladder, or files.
     #[arg(long, value_name = "PLAN,...", value_delimiter = ',', default_value = "office,ring,flat")]
     plans: Vec<String>,
     /// Factors on every noise of the robot, 0 to 100.
@@ -111,7 +92,14 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     for name in &arguments.plans {
         let plan = load_plan(name)?;
         let one = |arguments: &Arguments, plan: &Plan, noise: f64, seed: u64| match arguments.filter {
-            FilterArgument::Ordered => one::<64, Ordered>(arguments, plan, noise, seed, &ordered(), &mut [0; 64 * 1024]),
+            FilterArgument::Ordered => one::<{ ordered::VERTICES }, ordered::Filter>(
+                arguments,
+                plan,
+                noise,
+                seed,
+                &ordered::ROBOT,
+                &mut [0; ordered::SNAPSHOT_BYTES],
+            ),
             FilterArgument::Robust => one::<{ robust::VERTICES }, robust::Filter>(
                 arguments,
                 plan,
@@ -235,9 +223,8 @@ fn hint_row(name: &str, noise: f64, runs: &[Run]) -> String {
     let mut all = HintReport::default();
     runs.iter().for_each(|run| all.add(&run.hints));
     let percent = |part: usize, whole: usize| 100.0 * part as f64 / whole.max(1) as f64;
-    let deviation = |errors: &[f64]| {
-        (errors.iter().map(|error| error * error).sum::<f64>() / errors.len().max(1) as f64).sqrt()
-    };
+    let deviation =
+        |errors: &[f64]| (errors.iter().map(|error| error * error).sum::<f64>() / errors.len().max(1) as f64).sqrt();
     let rank = |errors: &[f64]| {
         let mut sizes: Vec<f64> = errors.iter().map(|error| error.abs()).collect();
         sizes.sort_by(f64::total_cmp);

@@ -8,7 +8,7 @@ use toposlam_eval::mapping::FilterChoice;
 pub(super) enum FilterArgument {
     /// Ordered filter.
     Ordered,
-    /// Robust filter, as in the firmware.
+    /// Robust filter.
     Robust,
     /// Filter of the paper.
     Paper,

@@ -4,6 +4,7 @@
 pub(crate) mod console;
 mod drive;
 pub(crate) mod emulate;
+mod emulate_small;
 pub(crate) mod evaluate;
 pub(crate) mod explore;
 pub(crate) mod export;

@@ -8,16 +8,11 @@ use crate::{
 };
 use std::f64::consts::TAU;
 use toposlam::Filter as _;
-use toposlam::{Bearing, DartMap, FaultKind, Map, Observation, OrderedConfig, OrderedFilter, VertexId};
-
-const HYPOTHESES: usize = 10;
-const DARTS: usize = 192;
-const HISTORY: usize = 320;
-
-type Reference = OrderedFilter<HYPOTHESES, VERTICES, DARTS, HISTORY>;
+use toposlam::reference::ordered::{self as reference, DARTS, HISTORY};
+use toposlam::{Bearing, DartMap, FaultKind, Map, Observation, OrderedConfig, VertexId};
 
 pub(super) fn start(settings: &Settings, trial: &Trial) -> Box<dyn Candidate> {
-    let mut filter = Box::new(Reference::new());
+    let mut filter = Box::new(reference::Filter::new());
     let config = if let Filter::Ordered(config) = settings.filter { config } else { OrderedConfig::DEFAULT };
     let started = filter.start(config, trial.filter_seed);
     assert!(started.is_ok(), "the configuration was checked");
@@ -27,7 +22,7 @@ pub(super) fn start(settings: &Settings, trial: &Trial) -> Box<dyn Candidate> {
 /// The filter, and the vertex of every place so far. The filter decides about the places of its history again at every update;
 /// for older ones the last decision counts.
 struct Ordered {
-    filter: Box<Reference>,
+    filter: Box<reference::Filter>,
     path: Vec<Option<VertexId>>,
 }
 
@@ -87,7 +82,7 @@ impl Candidate for Ordered {
 
 /// The environment of a path as a map of the filter, and the number of each of its darts there. `None` without ways, or when
 /// the map has no room.
-fn true_map(trial: &Trial) -> Option<(DartMap<VERTICES, DARTS>, Vec<u8>)> {
+fn true_map(trial: &Trial) -> Option<(DartMap<{ reference::VERTICES }, DARTS>, Vec<u8>)> {
     let corridors = trial.corridors.as_ref()?;
     let rotation = corridors.rotation();
     let mut map = DartMap::EMPTY;

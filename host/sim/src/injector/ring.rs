@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use toposlam::reference::SONARS;
+use toposlam::reference;
 use toposlam::ring::{Echo, RingFrame};
 use toposlam::{FaultCounters, FaultKind};
 
@@ -38,7 +38,7 @@ impl fmt::Display for RingCounts {
 
 /// Injects faults into the frames between a world and a robot.
 #[derive(Clone, Debug)]
-pub struct RingInjector {
+pub struct RingInjector<const SONARS: usize = { reference::SONARS }> {
     rates: FaultRates,
     chance: Chance,
     /// The last frame that the sonars measured and the robot received.
@@ -47,7 +47,7 @@ pub struct RingInjector {
     counts: RingCounts,
 }
 
-impl RingInjector {
+impl<const SONARS: usize> RingInjector<SONARS> {
     /// An injector for one world.
     pub fn new(rates: FaultRates, seed: u64) -> Self {
         Self { rates, chance: Chance::new(seed, 0), before: None, stuck_frames_left: 0, counts: RingCounts::default() }
@@ -96,6 +96,7 @@ impl RingInjector {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use toposlam::reference::SONARS;
 
     fn frames(rates: FaultRates, seed: u64) -> (Vec<RingFrame<SONARS>>, RingCounts, FaultCounters) {
         let mut injector = RingInjector::new(rates, seed);

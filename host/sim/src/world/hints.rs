@@ -5,8 +5,8 @@ use std::f64::consts::TAU;
 
 use toposlam::{Exit, Passage, Ways};
 
-use super::{GroundTruth, TrueWay};
 use super::ray_casting::wrapped;
+use super::{GroundTruth, TrueWay};
 
 /// A bearing that was told belongs to the way within this angle, in radians.
 const SAME_WAY_RAD: f64 = 0.55;
@@ -177,9 +177,8 @@ impl Sighting {
         within_rad: f64,
     ) -> Vec<((usize, bool), f64)> {
         let others: Vec<_> = ways.iter().map(TrueWay::dart).filter(|dart| *dart != self.arrival).collect();
-        let off_rad = |dart: &(usize, bool), seen_rad: f64| {
-            wrapped(seen_rad - (bearings[dart] - bearings[&self.arrival])).abs()
-        };
+        let off_rad =
+            |dart: &(usize, bool), seen_rad: f64| wrapped(seen_rad - (bearings[dart] - bearings[&self.arrival])).abs();
         let mut pairs: Vec<(f64, (usize, bool), usize)> = Vec::new();
         for dart in &others {
             for (index, &seen_rad) in self.seen_rad.iter().enumerate() {

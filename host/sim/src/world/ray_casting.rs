@@ -9,11 +9,10 @@ use toposlam::ring::{Echo, RingFrame};
 use super::plan::Plan;
 use super::{Point, Pose};
 
-/// Number of sonars of the simulated ring: evenly spaced and counter-clockwise, the first straight ahead.
+/// Number of sonars of the simulated ring of the reference robot: evenly spaced and counter-clockwise, the first straight ahead.
 pub const SONARS: usize = 16;
-/// Number of rays between the axes of two neighbouring sonars. Overlapping cones share their rays.
-const RAYS_EACH: usize = 6;
-const RAYS: usize = SONARS * RAYS_EACH;
+/// Number of rays of a ring. Overlapping cones share their rays.
+const RAYS: usize = 96;
 
 /// Cone, range and noise of the sonars.
 ///
@@ -67,9 +66,15 @@ impl Scene {
         Self { plan: plan.clone(), corners: plan.corners() }
     }
 
-    /// Simulates one reading of the ring.
-    pub(super) fn frame(&self, pose: &Pose, model: &SonarModel, random: &mut impl Rng) -> RingFrame<SONARS> {
-        let mut heard_mm = self.walls(pose, model);
+    /// Simulates one reading of a ring. `SONARS` divides the number of rays.
+    pub(super) fn frame<const SONARS: usize>(
+        &self,
+        pose: &Pose,
+        model: &SonarModel,
+        random: &mut impl Rng,
+    ) -> RingFrame<SONARS> {
+        const { assert!(RAYS.is_multiple_of(SONARS) && SONARS <= 16, "the sonars are on rays and have a bit each") };
+        let mut heard_mm: [f64; SONARS] = self.walls(pose, model);
         self.hear_corners(pose, model, &mut heard_mm);
         let mut echoes = [Echo::Dead; SONARS];
         for (sonar, (echo, heard_mm)) in echoes.iter_mut().zip(heard_mm).enumerate() {
@@ -89,7 +94,7 @@ impl Scene {
     }
 
     /// Range of the nearest wall that each sonar measures, in millimetres; infinite without an echo.
-    fn walls(&self, pose: &Pose, model: &SonarModel) -> [f64; SONARS] {
+    fn walls<const SONARS: usize>(&self, pose: &Pose, model: &SonarModel) -> [f64; SONARS] {
         let spacing = TAU / RAYS as f64;
         let rays: [f64; RAYS] = std::array::from_fn(|ray| {
             let direction = pose.heading_rad + ray as f64 * spacing;
@@ -98,13 +103,13 @@ impl Scene {
         });
         let half = ((model.cone_half_angle_rad / spacing) as usize).min(RAYS / 2);
         std::array::from_fn(|sonar| {
-            let first = sonar * RAYS_EACH + RAYS - half;
+            let first = sonar * (RAYS / SONARS) + RAYS - half;
             (first..=first + 2 * half).map(|ray| rays[ray % RAYS]).fold(f64::INFINITY, f64::min)
         })
     }
 
     /// Adds the echoes of the visible corners in each cone.
-    fn hear_corners(&self, pose: &Pose, model: &SonarModel, heard_mm: &mut [f64; SONARS]) {
+    fn hear_corners<const SONARS: usize>(&self, pose: &Pose, model: &SonarModel, heard_mm: &mut [f64; SONARS]) {
         for corner in &self.corners {
             let range_mm = pose.position.distance_mm(*corner);
             if range_mm > model.range_max_mm {
@@ -187,12 +192,12 @@ mod tests {
         let perfect = SonarModel { range_sd_mm: 0.0, missed_share: 0.0, ..SonarModel::default() };
         let pose = Pose { position: Point::new(3000.0, 1000.0), heading_rad: 0.0 };
         let mut random = Xoshiro256PlusPlus::seed_from_u64(1);
-        let frame = closet().frame(&pose, &perfect, &mut random);
+        let frame: RingFrame<SONARS> = closet().frame(&pose, &perfect, &mut random);
         let heard = frame.echoes.map(|echo| echo.range_mm().unwrap_or(0));
         assert_eq!((heard[0], heard[4], heard[8], heard[12]), (1000, 1000, 3000, 1000));
         assert_eq!((heard[2], heard[14]), (1414, 1414));
         let dead = SonarModel { dead_sonars: 1 << 4, ..perfect };
-        assert_eq!(closet().frame(&pose, &dead, &mut random).echoes[4], Echo::Dead);
+        assert_eq!(closet().frame::<SONARS>(&pose, &dead, &mut random).echoes[4], Echo::Dead);
         let missed = SonarModel { missed_share: 1.0, ..perfect };
         assert_eq!(closet().frame(&pose, &missed, &mut random).echoes, [Echo::Silence; SONARS]);
     }

@@ -6,7 +6,7 @@ use rand_xoshiro::Xoshiro256PlusPlus;
 use toposlam::drive::{VelocityCommand, WheelSpeeds, WheelsConfig};
 use toposlam::ring::RingFrame;
 
-use super::ray_casting::{SONARS, Scene, wrapped};
+use super::ray_casting::{Scene, wrapped};
 use super::{Plan, Point, Pose, RobotModel, TrueMap, Truth, VoronoiError};
 
 /// Distance within which the robot is at a true node, in millimetres.
@@ -82,8 +82,8 @@ impl Rover {
         self.bumps
     }
 
-    /// Reads the ring once and returns the ground truth of that frame.
-    pub fn frame(&mut self) -> (RingFrame<SONARS>, Truth) {
+    /// Reads the ring of 4, 8 or 16 sonars once and returns the ground truth of that frame.
+    pub fn frame<const SONARS: usize>(&mut self) -> (RingFrame<SONARS>, Truth) {
         let frame = self.scene.frame(&self.pose, &self.model.sonar, &mut self.random);
         let node = self.map.nearest_node(self.pose.position).filter(|(_, distance_mm)| *distance_mm <= AT_NODE_MM);
         let truth =

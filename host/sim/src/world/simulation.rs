@@ -85,6 +85,13 @@ impl Default for RobotModel {
 }
 
 impl RobotModel {
+    /// A robot with a ring of this many sonars. The cones of a small ring are as wide as the gaps between their axes.
+    pub fn for_ring(sonars: usize) -> Self {
+        let default = Self::default();
+        let cone_half_angle_rad = default.sonar.cone_half_angle_rad.max(PI / sonars as f64);
+        Self { sonar: SonarModel { cone_half_angle_rad, ..default.sonar }, ..default }
+    }
+
     /// The same robot with every noise scaled: range noise, missed echoes, and deviation from the edge.
     pub fn with_noise(self, factor: f64) -> Self {
         let sonar = SonarModel {

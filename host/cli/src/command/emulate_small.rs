@@ -1,0 +1,148 @@
+//! `toposlam emulate --robot small`: the small robot on an emulated Cortex-M0, and the same robot on the host beside it.
+
+use std::collections::VecDeque;
+use std::path::PathBuf;
+use std::process::Command;
+use std::time::Duration;
+
+use anyhow::{Context, bail, ensure};
+use toposlam::reference::small::{Filter, HISTORY, HYPOTHESES, ROBOT, SONARS, VERTICES};
+use toposlam::wire::{Decoder, Message, Progress as Decoded};
+use toposlam_cli::emulator::microbit::Microbit;
+use toposlam_cli::progress::Progress;
+use toposlam_sim::exploration::Exploration;
+
+use super::drive::Summary;
+use super::emulate::Arguments;
+
+/// Path of the image below the target directory.
+const IMAGE: &str = "microbit/thumbv6m-none-eabi/release/robot";
+/// The workspace of the image.
+const WORKSPACE: &str = "boards/microbit";
+/// Instructions and the ticks that they take.
+const INSTRUCTIONS: u64 = 125;
+const TICKS: u64 = 128;
+/// The processor's clock in kHz.
+const CLOCK_KHZ: u64 = 16_000;
+
+type SmallExploration<'buffer> = Exploration<'buffer, VERTICES, Filter, SONARS>;
+
+pub(super) fn run(arguments: &Arguments) -> anyhow::Result<()> {
+    let elf = match &arguments.elf {
+        Some(elf) => elf.clone(),
+        None => build()?,
+    };
+    let (plan, model) = arguments.drive.world_for_ring(SONARS)?;
+    let mut exploration = SmallExploration::with_robot(&plan, model, arguments.drive.seed(), &ROBOT, &mut [])?;
+    let timeout = Duration::from_secs(arguments.timeout_s);
+    let mut machine = Microbit::<SONARS>::start(&arguments.qemu, &elf, timeout)?;
+    let mut lines = Lines::default();
+    let progress = Progress::new("", arguments.places, "places");
+    let mut messages = 0;
+    while exploration.places() < arguments.places {
+        exploration.board().sent.clear();
+        let frame = exploration.frame();
+        machine.send(&frame, &[])?;
+        if exploration.map(&frame).is_some()
+            && let Some(step) = exploration.steps().last()
+        {
+            progress.println(step);
+            progress.increment();
+        }
+        let board = exploration.board();
+        let velocity = board.velocity;
+        for expected in lines.host(&board.sent)? {
+            let message = lines.firmware(&mut machine)?;
+            ensure!(is_same(&message, &expected), "the firmware sent {message:?}, but the simulation {expected:?}");
+            messages += 1;
+        }
+        exploration.drive(velocity);
+    }
+    drop(progress);
+    let printed = machine.end()?;
+    arguments.drive.summarise(&Summary::of(&plan, &exploration))?;
+    print_figures(&printed)?;
+    println!("hypotheses: {HYPOTHESES}\nvertices: {VERTICES}\nhistory: {HISTORY}");
+    println!("all {messages} messages of the firmware and of the simulation are equal bit for bit");
+    Ok(())
+}
+
+/// Whether two messages are equal. The reports of the board differ: time and stack.
+fn is_same(firmware: &Message, simulation: &Message) -> bool {
+    matches!((firmware, simulation), (Message::Health(_), Message::Health(_))) || firmware == simulation
+}
+
+/// The decoders of both lines.
+#[derive(Default)]
+struct Lines {
+    host: Decoder,
+    firmware: Decoder,
+    waiting: VecDeque<Message>,
+}
+
+impl Lines {
+    /// The messages of the simulated robot.
+    fn host(&mut self, bytes: &[u8]) -> anyhow::Result<Vec<Message>> {
+        decoded(&mut self.host, bytes)
+    }
+
+    /// The next message of the emulated robot.
+    fn firmware(&mut self, machine: &mut Microbit<SONARS>) -> anyhow::Result<Message> {
+        loop {
+            if let Some(message) = self.waiting.pop_front() {
+                return Ok(message);
+            }
+            self.waiting.extend(decoded(&mut self.firmware, &machine.receive()?)?);
+        }
+    }
+}
+
+fn decoded(decoder: &mut Decoder, bytes: &[u8]) -> anyhow::Result<Vec<Message>> {
+    let mut messages = Vec::new();
+    let mut rest = bytes;
+    loop {
+        rest = match decoder.feed(rest) {
+            Decoded::NeedsMore => return Ok(messages),
+            Decoded::Error { error, .. } => bail!("a corrupt message: {error}"),
+            Decoded::Message { message, rest, .. } => {
+                messages.push(message);
+                rest
+            }
+        };
+    }
+}
+
+/// Prints the figures of the image, ticks as instructions, and as milliseconds if each took one cycle.
+fn print_figures(printed: &str) -> anyhow::Result<()> {
+    for line in printed.lines() {
+        let (name, number) = line.split_once(": ").with_context(|| format!("the image printed {line:?}"))?;
+        let number: u64 = number.parse().with_context(|| format!("the image printed {line:?}"))?;
+        match name.split_once("_ticks") {
+            Some((what, which)) => {
+                let instructions = number * INSTRUCTIONS / TICKS;
+                println!("{what}_instructions{which}: {instructions}");
+                println!("{what}_ms_at_16_mhz{which}: {}", instructions.div_ceil(CLOCK_KHZ));
+            }
+            None => println!("{name}: {number}"),
+        }
+    }
+    Ok(())
+}
+
+/// Builds the image from the working directory and returns its path.
+fn build() -> anyhow::Result<PathBuf> {
+    let cargo = std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into());
+    let target = std::env::var_os("CARGO_TARGET_DIR").map_or_else(|| PathBuf::from("target"), PathBuf::from);
+    let target = std::path::absolute(target)?;
+    let status = Command::new(cargo)
+        .args(["build", "--release", "--locked"])
+        .current_dir(WORKSPACE)
+        .env("CARGO_TARGET_DIR", target.join("microbit"))
+        .status()
+        .with_context(|| format!("building the image in {WORKSPACE}"))?;
+    ensure!(
+        status.success(),
+        "the image was not built; it needs `rustup target add thumbv6m-none-eabi` and the project's directory"
+    );
+    Ok(target.join(IMAGE))
+}
