@@ -295,8 +295,8 @@ impl LocalPlanner {
         let towards_mrad = if self.target_mrad < 0 { self.rotation_mrad.max(0) } else { self.rotation_mrad.min(0) };
         let expected_mrad = rotated(self.target_mrad, towards_mrad);
         let openings = scan.openings(obstacles);
-        // At a dead end there is no other opening.
-        let within_mrad = if openings.count() == 1 { HALF_TURN_MRAD as u16 } else { SAME_OPENING_MRAD };
+        // A dead end has no other opening.
+        let within_mrad = if openings.count() == 1 { HALF_TURN_MRAD as u16 / 2 } else { SAME_OPENING_MRAD };
         let seen = openings.nearest(expected_mrad, within_mrad);
         let target_mrad = seen.map_or(expected_mrad, |(_, target_mrad)| target_mrad);
         // Straight behind, noise must not reverse the direction of the turn.

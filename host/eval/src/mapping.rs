@@ -145,7 +145,7 @@ impl<const SONARS: usize> Mapping<SONARS> {
     pub fn observe(&mut self, frame: &RingFrame<SONARS>, passage: Passage) -> Option<Step> {
         let (place, update) = self.stages.observe(frame, passage)?;
         let map = self.map();
-        let told = Told { passage, ways: passage.ways(&place.ways, 0) };
+        let told = Told { passage, ways: passage.ways(&place, 0) };
         let step = Step { place, told, update, vertices: map.vertices().len() as u8, edges: map.edges().count() };
         self.steps.push(step);
         Some(step)
