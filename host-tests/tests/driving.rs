@@ -100,7 +100,7 @@ fn a_robot_without_ways_explores_at_random_and_has_no_path_to_a_vertex() {
 
 #[test]
 fn a_map_is_complete_when_every_way_was_driven_and_the_robot_goes_on() {
-    let plan = Plan::built_in("ladder").unwrap();
+    let plan = Plan::built_in("office").unwrap();
     let mut buffer = [0; SNAPSHOT_BYTES];
     let mut exploration = Exploration::start(&plan, RobotModel::default(), 3, &mut buffer).unwrap();
     let edges = exploration.rover().true_map().edges.len();
@@ -120,10 +120,11 @@ fn a_map_is_complete_when_every_way_was_driven_and_the_robot_goes_on() {
 
 #[test]
 fn one_of_two_parallel_corridors_is_the_shorter_way_to_a_vertex() {
-    // The two ends of a rail of the ladder are joined by the rail and, around the other rail, by the rungs.
+    // Two junctions of the ladder are joined by a rail and, around the other rail, by the rungs. No path has more than five edges,
+    // from a dead end to the farthest.
     let plan = Plan::built_in("ladder").unwrap();
     let mut buffer = [0; SNAPSHOT_BYTES];
-    let mut exploration = Exploration::start(&plan, RobotModel::default(), 3, &mut buffer).unwrap();
+    let mut exploration = Exploration::start(&plan, RobotModel::default(), 1, &mut buffer).unwrap();
     while !exploration.robot().drive().is_complete() {
         exploration.advance();
     }

@@ -92,6 +92,8 @@ pub(super) struct LocalPlanner {
     target_mrad: i16,
     /// Change of all bearings since the frame before.
     rotation_mrad: i32,
+    /// The same for each frame of a turn to an exit, smoothed.
+    turn_rate_mrad: i32,
     /// The degree of the place by the detector.
     degree: Option<u8>,
     departure: Departure,
@@ -107,6 +109,7 @@ impl LocalPlanner {
             entry_mrad: 0,
             target_mrad: 0,
             rotation_mrad: 0,
+            turn_rate_mrad: 0,
             degree: None,
             departure: Departure::UNKNOWN,
             faults: FaultCounters::new(),
@@ -279,6 +282,7 @@ impl LocalPlanner {
         };
         self.departure = Departure { is_known: true, exit_mrad, driven_permille: 0 };
         self.target_mrad = rotated(self.entry_mrad, exit_mrad.into());
+        self.turn_rate_mrad = 0;
         self.enter(DriveState::TurnToExit);
         self.turn_to_exit(scan, obstacles)
     }
@@ -292,11 +296,13 @@ impl LocalPlanner {
             return self.give_up(scan);
         }
         // An exit that this frame does not show is where the rotation of the ring brings it. The robot turns towards the exit.
-        let towards_mrad = if self.target_mrad < 0 { self.rotation_mrad.max(0) } else { self.rotation_mrad.min(0) };
+        self.turn_rate_mrad += (self.rotation_mrad - self.turn_rate_mrad) / 4;
+        let towards_mrad = if self.target_mrad < 0 { self.turn_rate_mrad.max(0) } else { self.turn_rate_mrad.min(0) };
         let expected_mrad = rotated(self.target_mrad, towards_mrad);
         let openings = scan.openings(obstacles);
         // A dead end has no other opening.
-        let within_mrad = if openings.count() == 1 { HALF_TURN_MRAD as u16 / 2 } else { SAME_OPENING_MRAD };
+        let is_dead_end = self.degree == Some(1) && openings.count() == 1;
+        let within_mrad = if is_dead_end { HALF_TURN_MRAD as u16 } else { SAME_OPENING_MRAD };
         let seen = openings.nearest(expected_mrad, within_mrad);
         let target_mrad = seen.map_or(expected_mrad, |(_, target_mrad)| target_mrad);
         // Straight behind, noise must not reverse the direction of the turn.

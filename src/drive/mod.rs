@@ -136,7 +136,7 @@ impl<const V: usize> Drive<V> {
     /// the fewest passages, so that mistakes of the map are found.
     ///
     /// A way that at most a third of the visits to its vertex have shown does not count. The map must be more likely than not, and
-    /// all must hold at two successive places; three successive places with a way to drive end it.
+    /// all must hold at two more successive places than the map has edges; three successive places with a way to drive end it.
     pub const fn is_complete(&self) -> bool {
         self.route_planner.is_complete()
     }

@@ -13,10 +13,8 @@ use crate::place::Obstacles;
 const REACHED_Q16: u32 = 1 << 15;
 /// Minimum probability of a map that counts as complete, in units of 2⁻¹⁶.
 const COMPLETE_Q16: u32 = 1 << 15;
-/// Successive places without a way to drive after which a map is complete.
-const COMPLETE_PLACES: u8 = 2;
 /// Successive places with a way to drive after which a map is no longer complete.
-const INCOMPLETE_PLACES: u8 = 3;
+const INCOMPLETE_PLACES: usize = 3;
 /// An edge with fewer passages is not confirmed.
 const CONFIRMED_PASSAGES: u8 = 2;
 /// An exit is matched to the way of the map whose bearing differs by at most this, in units of 2⁻¹⁶ of a turn: 0.55 rad.
@@ -166,7 +164,9 @@ impl<const V: usize> RoutePlanner<V> {
             return;
         }
         self.contrary_places = self.contrary_places.saturating_add(1);
-        if self.contrary_places >= if self.is_complete { INCOMPLETE_PLACES } else { COMPLETE_PLACES } {
+        // A map is complete when it has stood a patrol of as many places as it has edges.
+        let patrol = darts.edges().count() + 2;
+        if usize::from(self.contrary_places) >= if self.is_complete { INCOMPLETE_PLACES } else { patrol } {
             self.is_complete = !self.is_complete;
             self.contrary_places = 0;
         }

@@ -1,9 +1,7 @@
 //! The edge-ordered map: at each vertex the ways in counter-clockwise order, and which two of them an edge joins.
 //!
 //! One way of one vertex is a *dart*. The partner of a dart is the other end of its edge; a dart without partner is a
-//! *frontier*, a way that nobody has driven. A *face* is the orbit of "follow the edge, take the next way counter-clockwise";
-//! frontiers are left out. For a connected map of V vertices, E edges and F faces, V − E + F = 2 − 2 · genus (Euler), and a map
-//! that can be drawn in the plane has genus 0.
+//! *frontier*, a way that nobody has driven.
 
 use super::dart::Darts;
 
@@ -264,88 +262,6 @@ impl<const V: usize, const D: usize> DartMap<V, D> {
         ways.get(position + 1).or(ways.first()).copied().unwrap_or(dart)
     }
 
-    /// Whether two frontiers lie in one face: then an edge between them leaves the genus as it is. Two frontiers of parts of
-    /// the map that are not connected lie in different faces. Cost: O(D).
-    pub fn share_face(&self, a: u8, b: u8) -> bool {
-        let mut dart = a;
-        for _ in 0..=2 * u16::from(self.darts) {
-            dart = self.next_way(dart);
-            if dart == b {
-                return true;
-            }
-            if dart == a {
-                return false;
-            }
-            // Along an edge the walk arrives by the partner, and goes on with the way next to it.
-            dart = self.partner(dart).unwrap_or(dart);
-        }
-        false
-    }
-
-    /// How many faces the map has; a vertex without edges has one. Cost: O(D).
-    pub fn faces(&self) -> u16 {
-        let mut passed = [false; D];
-        let mut faces = 0;
-        for start in 0..self.darts {
-            if self.partner(start).is_none() || passed.get(usize::from(start)).is_none_or(|&passed| passed) {
-                continue;
-            }
-            faces += 1;
-            let mut dart = start;
-            while let (Some(partner), Some(passed)) =
-                (self.partner(dart), passed.get_mut(usize::from(dart)).filter(|passed| !**passed))
-            {
-                *passed = true;
-                dart = self.next_way(partner);
-                while self.partner(dart).is_none() {
-                    dart = self.next_way(dart);
-                }
-            }
-        }
-        let alone = |&vertex: &u8| self.ways(vertex).iter().all(|&way| self.partner(way).is_none());
-        faces + (0..self.vertices).filter(alone).count() as u16
-    }
-
-    /// Whether edges lead from one vertex to another. Cost: O(D).
-    pub fn are_connected(&self, a: u8, b: u8) -> bool {
-        let (mut reached, mut open) = (1_u64 << (a & 63), 1_u64 << (a & 63));
-        while open != 0 && reached >> (b & 63) & 1 == 0 {
-            let vertex = open.trailing_zeros() as u8;
-            open &= open - 1;
-            for partner in self.ways(vertex).iter().filter_map(|&way| self.partner(way)) {
-                let bit = 1_u64 << (self.vertex(partner) & 63);
-                open |= bit & !reached;
-                reached |= bit;
-            }
-        }
-        reached >> (b & 63) & 1 == 1
-    }
-
-    /// How many parts that no edge connects the map has. Cost: O(V · D).
-    pub fn components(&self) -> u8 {
-        let mut component = [0_u8; V];
-        for (number, slot) in (0..self.vertices).zip(&mut component) {
-            *slot = number;
-        }
-        let of = |component: &[u8; V], vertex: u8| component.get(usize::from(vertex)).copied().unwrap_or(0);
-        let mut components = self.vertices;
-        for (a, b) in self.edges() {
-            let (kept, joined) = (of(&component, self.vertex(a)), of(&component, self.vertex(b)));
-            if kept != joined {
-                components -= 1;
-                component.iter_mut().filter(|of| **of == joined).for_each(|of| *of = kept);
-            }
-        }
-        components
-    }
-
-    /// The genus, summed over the parts of the map: 0 for a map that can be drawn in the plane as it is. Cost: O(V · D).
-    pub fn genus(&self) -> u8 {
-        let edges = self.edges().count() as i32;
-        let euler = i32::from(self.vertices) - edges + i32::from(self.faces());
-        ((2 * i32::from(self.components()) - euler) / 2).max(0) as u8
-    }
-
     /// Moves a way to another vertex, with its bearing there, and leaves it in the list of the first; `false` when the other has
     /// no room.
     pub(crate) fn move_way(&mut self, way: u8, vertex: u8, bearing: Bearing) -> bool {
@@ -380,6 +296,45 @@ impl<const V: usize, const D: usize> DartMap<V, D> {
         if step != 0 {
             self.sort_ways(vertex);
         }
+    }
+
+    /// Takes the ways of a vertex that were never seen for seen at this many visits.
+    pub(crate) fn assume_seen(&mut self, vertex: u8, visits: u8) {
+        for dart in self.dart.iter_mut().take(self.darts.into()).filter(|dart| dart.vertex == vertex && dart.seen == 0)
+        {
+            dart.seen = visits;
+        }
+    }
+
+    /// Removes the darts that `is_removed` names, which must be frontiers. Darts keep their order. Returns the new number of each,
+    /// [`NONE`] for those that are gone.
+    pub(crate) fn remove_frontiers(&mut self, is_removed: impl Fn(u8) -> bool) -> [u8; D] {
+        let mut numbers = [NONE; D];
+        let mut kept = 0;
+        for (dart, number) in (0..self.darts).zip(&mut numbers) {
+            if self.get(dart).partner != NONE || !is_removed(dart) {
+                *number = kept;
+                kept += 1;
+            }
+        }
+        let renumbered = |dart: u8| numbers.get(usize::from(dart)).copied().unwrap_or(NONE);
+        for dart in 0..self.darts {
+            let mut moved = self.get(dart);
+            moved.partner = renumbered(moved.partner);
+            if let Some(slot) = self.dart.get_mut(usize::from(renumbered(dart))) {
+                *slot = moved;
+            }
+        }
+        for ways in self.ways.iter_mut().take(self.vertices.into()) {
+            let old = core::mem::replace(ways, VertexWays::NONE);
+            let left = old.as_slice().iter().map(|&dart| renumbered(dart)).filter(|&dart| dart != NONE);
+            for (slot, dart) in ways.darts.iter_mut().zip(left) {
+                *slot = dart;
+                ways.count += 1;
+            }
+        }
+        self.darts = kept;
+        numbers
     }
 
     /// Corrects the mean bearing of a way.
@@ -434,96 +389,6 @@ mod tests {
 
     type Small = DartMap<8, 24>;
 
-    /// A map from the numbers of ways of its vertices and the edges between ways, both numbered from 0 in order.
-    fn map(ways: &[usize], edges: &[(u8, u8)]) -> Small {
-        let mut map = Small::EMPTY;
-        for &count in ways {
-            let vertex = map.add_vertex().unwrap();
-            (0..count).for_each(|way| {
-                map.add_way(vertex, (way * 8000) as u16).unwrap();
-            });
-        }
-        edges.iter().for_each(|&(a, b)| map.join(a, b));
-        map
-    }
-
-    /// The faces as orbits of a permutation, counted without any shortcut.
-    fn orbits(map: &Small) -> usize {
-        let driven = |vertex| -> Vec<u8> {
-            map.ways(vertex).iter().copied().filter(|&way| map.partner(way).is_some()).collect()
-        };
-        let next = |dart: u8| {
-            let arrival = map.partner(dart).unwrap();
-            let around = driven(map.vertex(arrival));
-            around[(around.iter().position(|&way| way == arrival).unwrap() + 1) % around.len()]
-        };
-        let darts: Vec<u8> = (0..map.vertices()).flat_map(driven).collect();
-        let orbit = |&start: &u8| {
-            let mut orbit = vec![start];
-            let mut dart = next(start);
-            while dart != start {
-                orbit.push(dart);
-                dart = next(dart);
-            }
-            orbit.into_iter().min()
-        };
-        darts.iter().filter(|&dart| orbit(dart) == Some(*dart)).count()
-    }
-
-    #[test]
-    fn a_tree_has_one_face_and_a_ring_two() {
-        let tree = map(&[3, 1, 1, 1], &[(0, 3), (1, 4), (2, 5)]);
-        assert_eq!((tree.faces(), tree.genus()), (1, 0));
-        let ring = map(&[2, 2, 2], &[(1, 2), (3, 4), (5, 0)]);
-        assert_eq!((ring.faces(), ring.genus()), (2, 0));
-    }
-
-    #[test]
-    fn crossed_loops_do_not_lie_in_the_plane() {
-        assert_eq!(map(&[4], &[(0, 2), (1, 3)]).genus(), 1);
-        assert_eq!(map(&[4], &[(0, 1), (2, 3)]).genus(), 0);
-        // Three parallel edges, in opposite order at the two ends and in the same.
-        assert_eq!(map(&[3, 3], &[(0, 5), (1, 4), (2, 3)]).genus(), 0);
-        assert_eq!(map(&[3, 3], &[(0, 3), (1, 4), (2, 5)]).genus(), 1);
-    }
-
-    #[test]
-    fn an_edge_keeps_the_genus_exactly_when_its_ends_share_a_face() {
-        let mut state = 1_u32;
-        let mut below = |bound: usize| {
-            state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
-            ((state >> 16) as usize * bound) >> 16
-        };
-        let (mut same, mut other) = (0, 0);
-        for _ in 0..2000 {
-            let ways: Vec<usize> = (0..6).map(|_| 1 + below(4)).collect();
-            let mut map = map(&ways, &[]);
-            for _ in 0..12 {
-                let frontiers: Vec<u8> = map.frontiers().collect();
-                if frontiers.len() < 2 {
-                    break;
-                }
-                let (a, b) = (frontiers[below(frontiers.len())], frontiers[below(frontiers.len())]);
-                if a == b {
-                    continue;
-                }
-                let (genus, components, share) = (map.genus(), map.components(), map.share_face(a, b));
-                assert_eq!(share, map.share_face(b, a));
-                map.join(a, b);
-                let lone = (0..map.vertices()).filter(|&v| map.ways(v).iter().all(|&way| map.partner(way).is_none()));
-                assert_eq!(usize::from(map.faces()), orbits(&map) + lone.count());
-                if map.components() < components {
-                    assert!(!share);
-                    assert_eq!(map.genus(), genus);
-                } else {
-                    assert_eq!(map.genus(), genus + u8::from(!share));
-                    if share { same += 1 } else { other += 1 }
-                }
-            }
-        }
-        assert!(same > 100 && other > 100);
-    }
-
     #[test]
     fn ways_stay_in_order_and_full_tables_refuse() {
         let mut map = Small::EMPTY;
@@ -537,6 +402,12 @@ mod tests {
         assert_eq!(map.nearest_way(vertex, 65_500), Some((3, 500)));
         assert_eq!(map.nearest_way(vertex, 200), Some((3, 736)));
         assert_eq!((map.next_way(3), map.next_way(1)), (1, 4));
+        map.join(2, 5);
+        let numbers = map.remove_frontiers(|dart| [0, 2, 3].contains(&dart));
+        assert_eq!(&numbers[..7], [NONE, 0, 1, NONE, 2, 3, 4]);
+        let bearings: Vec<u16> = map.ways(vertex).iter().map(|&way| map.bearing(way)).collect();
+        assert_eq!(bearings, [1_000, 2_000, 3_000, 30_000, 40_000]);
+        assert_eq!((map.partner(1), map.partner(3), map.partner(0)), (Some(3), Some(1), None));
         (1..8).for_each(|_| assert!(map.add_vertex().is_some()));
         assert_eq!(map.add_vertex(), None);
     }

@@ -2,6 +2,7 @@
 
 mod dart;
 pub(crate) mod darts;
+pub(crate) mod faces;
 mod per_vertex;
 mod vertex;
 mod vertex_set;

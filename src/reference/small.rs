@@ -1,32 +1,52 @@
-//! The small robot: a ring of eight sensors, and capacities for a microcontroller with 16 KiB of RAM.
+//! The small robot: capacities for a microcontroller with 16 KiB of RAM, and a ring of eight sensors.
+//!
+//! With its buffer for snapshots empty, the whole robot takes less than 12 KiB, which leaves 4 KiB for the stack. The same
+//! capacities serve larger rings.
+//!
+//! ```
+//! use toposlam::Filter;
+//! use toposlam::reference::small;
+//!
+//! let mut filter = small::Filter::new();
+//! filter.start(small::FILTER, 1)?;
+//! assert!(size_of_val(&filter) < 10 * 1024);
+//! # Ok::<(), toposlam::ConfigError>(())
+//! ```
 
 use crate::filter::{OrderedConfig, OrderedFilter};
+#[cfg(feature = "wire")]
 use crate::ring::RingGeometry;
 #[cfg(feature = "wire")]
 use crate::robot::{Robot, RobotConfig};
 
-/// The number of sensors in the ring.
+/// The number of sensors in the ring, 45° apart, counter-clockwise from straight ahead.
 pub const SONARS: usize = 8;
 /// The most hypotheses.
 pub const HYPOTHESES: usize = 4;
 /// The most vertices of a map.
 pub const VERTICES: usize = 16;
-/// The most ways of all vertices of a map.
-pub const WAYS: usize = 52;
+/// The most darts of a map: three ways for each vertex, and four more.
+pub const DARTS: usize = 52;
 /// The most observations in the history.
 pub const HISTORY: usize = 100;
 
-/// Eight sensors 45° apart, counter-clockwise from straight ahead.
-pub const RING: RingGeometry<SONARS> = RingGeometry::even();
-
 /// The filter.
-pub type Filter = OrderedFilter<HYPOTHESES, VERTICES, WAYS, HISTORY>;
+pub type Filter = OrderedFilter<HYPOTHESES, VERTICES, DARTS, HISTORY>;
 /// The settings of the filter.
 pub const FILTER: OrderedConfig = OrderedConfig::DEFAULT;
 
-/// The robot. Its buffer for snapshots may be empty.
+/// The robot, with a ring of eight sensors or another number.
 #[cfg(feature = "wire")]
-pub type SmallRobot<'buffer> = Robot<'buffer, SONARS, VERTICES, Filter>;
-/// The settings of the robot. Without a floating-point unit a place takes seconds.
+pub type SmallRobot<'buffer, const S: usize = SONARS> = Robot<'buffer, S, VERTICES, Filter>;
+
+/// The settings of the robot with an even ring. A turn of the main loop may take ten seconds, for a processor without a
+/// floating-point unit.
 #[cfg(feature = "wire")]
-pub const ROBOT: RobotConfig<SONARS, OrderedConfig> = RobotConfig::new(RING, FILTER).with_turn_bound_ms(10_000);
+#[must_use]
+pub const fn robot<const S: usize>() -> RobotConfig<S, OrderedConfig> {
+    RobotConfig::new(RingGeometry::even(), FILTER).with_turn_bound_ms(10_000)
+}
+
+const _: () = assert!(size_of::<Filter>() <= 10 * 1024, "the budget of the filter");
+#[cfg(feature = "wire")]
+const _: () = assert!(size_of::<SmallRobot<'static, 16>>() <= 12 * 1024 + 256, "the budget of the robot");

@@ -1,7 +1,7 @@
 //! The small robot on the machine `microbit` of QEMU: a Cortex-M0 without floating-point unit, with 16 KiB of RAM.
 //!
-//! The ring is at the other end of the serial line: a frame is eight codes of two bytes, the lower one first, as in the message
-//! `Ring`; then the number of the bytes that follow for the robot, and these. With the number 255 the run is over, and the image
+//! The ring is at the other end of the serial line: a frame is one code of two bytes a sensor, the lower byte first, as in the
+//! message `Ring`; then the number of the bytes that follow for the robot, and these. With the number 255 the run is over, and the image
 //! prints its figures and ends the emulator. In the other direction the line carries the messages of the robot. For the emulator
 //! only: the wheels get no power, and there is no watchdog. `docs/small-robot.md` has the figures.
 #![no_std]
@@ -14,17 +14,20 @@ mod stack;
 use core::panic::PanicInfo;
 
 use chip::{Clock, Uart};
+use cortex_m::asm;
 use cortex_m_rt::{ExceptionFrame, exception};
 use cortex_m_semihosting::{debug, hprintln};
 use toposlam::{
     FaultCounters,
     drive::VelocityCommand,
-    reference::small::{ROBOT, SONARS, SmallRobot},
+    reference::small::{self, SmallRobot},
     ring::{Echo, RingFrame},
     robot::{Board, SaveError},
     wire::QueueFull,
 };
 
+/// The number of sensors in the ring.
+const SONARS: usize = if cfg!(feature = "ring-of-16") { 16 } else { small::SONARS };
 /// In place of a number of bytes: the run is over.
 const END: u8 = 255;
 const TICKS_PER_MS: u32 = 16_000;
@@ -118,11 +121,11 @@ impl Cost {
 
 #[cortex_m_rt::entry]
 fn main() -> ! {
-    static mut ROBOT_CELL: SmallRobot<'static> = SmallRobot::new();
+    static mut ROBOT_CELL: SmallRobot<'static, SONARS> = SmallRobot::new();
 
     let robot = ROBOT_CELL;
     let mut board = Microbit { uart: Uart::open(), clock: Clock::start(), pending: 0, last_ticks: 0, ticks: 0 };
-    if robot.start(&ROBOT, &mut []).is_err() {
+    if robot.start(&small::robot(), &mut []).is_err() {
         // Does not happen: the settings are constants.
         panic!()
     }
@@ -137,15 +140,19 @@ fn main() -> ! {
     frames.print("frame");
     places.print("place");
     hprintln!("stack_high_water_bytes: {}", stack::stack_high_water_bytes());
-    hprintln!("robot_bytes: {}", size_of::<SmallRobot<'static>>());
+    hprintln!("robot_bytes: {}", size_of::<SmallRobot<'static, SONARS>>());
     debug::exit(debug::EXIT_SUCCESS);
-    loop {}
+    loop {
+        asm::wfi();
+    }
 }
 
 #[panic_handler]
 fn panic(_: &PanicInfo<'_>) -> ! {
     debug::exit(debug::EXIT_FAILURE);
-    loop {}
+    loop {
+        asm::wfi();
+    }
 }
 
 // SAFETY: the handler uses no state that the fault may have left inconsistent.
@@ -153,5 +160,7 @@ fn panic(_: &PanicInfo<'_>) -> ! {
 #[exception]
 unsafe fn HardFault(_: &ExceptionFrame) -> ! {
     debug::exit(debug::EXIT_FAILURE);
-    loop {}
+    loop {
+        asm::wfi();
+    }
 }

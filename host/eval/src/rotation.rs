@@ -166,6 +166,7 @@ impl From<Darts<'_>> for RotationSystem {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use rand::seq::SliceRandom;
     use toposlam_sim::world::Plan;
 
     #[test]
@@ -205,6 +206,36 @@ mod tests {
         let other = RotationSystem::new(vec![vec![0], vec![2, 5, 1], vec![4, 3, 7, 6]]);
         assert!(small().equals(&other, &[2, 1, 0]));
         assert!(!small().equals(&other, &[0, 1, 2]));
+    }
+
+    #[test]
+    fn a_multigraph_equals_itself_under_any_numbering_but_not_with_an_edge_less() {
+        let family: crate::family::Family = "4,20,8,24,2-3,3-6,0.03,multigraph".parse().unwrap();
+        let mut rng = crate::walk::path_rng(4, 0);
+        for index in 0..family.count {
+            let environment = family.environment(index).unwrap();
+            let system = environment.rotation().unwrap();
+            let mut shuffled = |count: usize| {
+                let mut numbers: Vec<usize> = (0..count).collect();
+                numbers.shuffle(&mut rng);
+                numbers
+            };
+            let (image, edges) = (shuffled(system.vertex_count()), shuffled(system.dart_count() / 2));
+            let mut ways = vec![Vec::new(); system.vertex_count()];
+            for (vertex, &renumbered) in image.iter().enumerate() {
+                // Every second edge has its darts exchanged.
+                let dart = |&dart: &usize| 2 * edges[dart / 2] + (dart + edges[dart / 2]) % 2;
+                ways[renumbered] = system.ways(vertex).iter().map(dart).collect();
+                ways[renumbered].rotate_left(edges[0] % system.ways(vertex).len());
+            }
+            let renumbered = RotationSystem::new(ways);
+            assert!(system.equals(&renumbered, &image));
+            let all: Vec<usize> = (0..system.vertex_count()).collect();
+            assert!(!system.equals(&renumbered.part(&all, |edge| edge > 0), &image));
+            let mut other = image.clone();
+            other.swap(0, 1);
+            assert!(!system.equals(&renumbered, &other) || environment.neighbours()[0] == environment.neighbours()[1]);
+        }
     }
 
     #[test]

@@ -54,11 +54,16 @@ impl<const N: usize, const V: usize, const D: usize, const T: usize> Beam<N, V, 
     }
 
     /// Starts with one hypothesis.
-    pub(super) fn begin_with(&mut self, hypothesis: &Hypothesis<V, D, T>) {
+    pub(super) fn start_with(&mut self, hypothesis: &Hypothesis<V, D, T>) {
         self.clear();
         if let Some(first) = self.slots.first_mut() {
             first.clone_from(hypothesis);
         }
+    }
+
+    /// Drops all hypotheses but the best one.
+    pub(super) fn keep_best(&mut self) {
+        self.len = self.len.min(1);
     }
 
     /// Whether the filter was not started.
@@ -126,8 +131,8 @@ impl<const N: usize, const V: usize, const D: usize, const T: usize> Beam<N, V, 
         }
     }
 
-    /// Takes observation `index` of the record: of all explanations by all hypotheses the best `N` distinct ones live on. Tells
-    /// whether the best of all had no room.
+    /// Takes observation `index` of the record: of all explanations by all hypotheses the best `N` distinct ones stay. Returns
+    /// whether the best of all, or a way that was seen, found no room.
     pub(super) fn grow(&mut self, model: &Model, record: &Record<T>, index: usize) -> bool {
         let mut chosen = [EMPTY; N];
         let mut count = 0;
@@ -144,12 +149,27 @@ impl<const N: usize, const V: usize, const D: usize, const T: usize> Beam<N, V, 
                 }
             });
         }
-        let lacks_room = chosen.first().is_none_or(|best| missed > best.score);
+        let mut lacks_room =
+            chosen.first().is_none_or(|best| missed > best.score || best.choice.target == Target::OffMap);
         if count == 0 {
-            // Where the robot is remains open until there is a place that is on the map.
-            self.each(|hypothesis| hypothesis.lose_way(index));
             return true;
         }
+        let entry = record.get(index);
+        self.replace(&mut chosen, count, |hypothesis, candidate, rank| {
+            let is_full = hypothesis.extend(&entry, index, candidate.choice, candidate.gain, 0);
+            lacks_room |= is_full && rank == 0;
+        });
+        lacks_room
+    }
+
+    /// Replaces the hypotheses by the children of the chosen candidates, the best first; `extend` makes a child of a copy of its
+    /// parent.
+    fn replace(
+        &mut self,
+        chosen: &mut [Candidate; N],
+        count: usize,
+        mut extend: impl FnMut(&mut Hypothesis<V, D, T>, &Candidate, usize),
+    ) {
         let mut children = [0_u8; N];
         for candidate in chosen.iter().take(count) {
             if let Some(children) = children.get_mut(usize::from(candidate.parent)) {
@@ -173,19 +193,37 @@ impl<const N: usize, const V: usize, const D: usize, const T: usize> Beam<N, V, 
             }
         }
         let mut taken = [false; N];
-        let entry = record.get(index);
-        for (candidate, order) in chosen.iter().take(count).zip(&mut self.order) {
+        for (rank, (candidate, order)) in chosen.iter().take(count).zip(&mut self.order).enumerate() {
             *order = candidate.parent;
             let slot = usize::from(candidate.parent);
             if let (Some(hypothesis), Some(taken)) = (self.slots.get_mut(slot), taken.get_mut(slot)) {
-                hypothesis.extend(&entry, index, candidate.choice, candidate.gain, 0);
+                extend(hypothesis, candidate, rank);
                 *taken = true;
             }
         }
         let free = (0..).zip(&taken).filter(|(_, taken)| !**taken).map(|(slot, _)| slot);
         self.order.iter_mut().skip(count).zip(free).for_each(|(order, slot)| *order = slot);
         self.len = count;
-        lacks_room
+    }
+
+    /// Takes observation `index` of the record for a visit on the map that all hypotheses have.
+    pub(super) fn localise(&mut self, model: &Model, record: &Record<T>, index: usize) {
+        let mut chosen = [EMPTY; N];
+        let mut count = 0;
+        for (rank, &slot) in self.order.iter().take(self.len).enumerate() {
+            let Some(parent) = self.slots.get(usize::from(slot)) else { continue };
+            parent.localisations(model, record, index, rank == 0, |at, gain| {
+                let choice = Choice { exit: NONE, target: Target::At(at) };
+                let candidate =
+                    Candidate { score: parent.score() + gain.total(), gain, key: at.into(), parent: slot, choice };
+                insert(&mut chosen, &mut count, candidate);
+            });
+        }
+        self.replace(&mut chosen, count, |hypothesis, candidate, _| {
+            if let Target::At(at) = candidate.choice.target {
+                hypothesis.follow_to(index, at, candidate.gain);
+            }
+        });
     }
 
     /// Takes in a hypothesis: in place of the one with the same map and place if it is better than that, else in a free

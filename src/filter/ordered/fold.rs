@@ -1,6 +1,7 @@
 //! Folding: when two darts are one, so are their vertices, their neighbours in order, and their partners.
 
-use super::hypothesis::{Hypothesis, Label};
+use super::hypothesis::Hypothesis;
+use super::label::Label;
 use super::model::{Model, SAME_WAY};
 use crate::map::darts::NONE;
 

@@ -1,66 +1,27 @@
 //! One hypothesis: an edge-ordered map, the way the robot came by, and what was counted on the way there.
 
+use super::label::Label;
 use super::model::{LN_WAYS, Model, SAME_WAY};
 use super::record::{Entry, Record};
 use crate::filter::Exit;
 use crate::map::darts::{Bearing, DartMap, NONE, WAYS};
-use crate::place::Fingerprint;
+use crate::map::faces::DartSet;
+use crate::map::{VertexId, VertexSet};
 
 /// Labels that are this many standard deviations off are not looked at.
 const FAR: f32 = 5.0;
 
-/// From so many visits on the counts of a vertex are halved when places leave the record.
-const FADE_VISITS: u16 = 512;
+/// The log likelihood of a place that is not on the map, in nats.
+pub(super) const LN_OFF_MAP: f32 = -20.0;
 
-/// What it costs to leave a place unexplained, in nats.
-const LOST: f32 = 20.0;
+/// In a path: a place that is not on the map.
+pub(crate) const OFF_MAP: u8 = 254;
 
-/// The statistics of one vertex: 12 bytes.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub(crate) struct Label {
-    pub(crate) mean: f32,
-    pub(crate) scatter: f32,
-    pub(crate) visits: u16,
-    /// At how many visits the ways were seen; saturates.
-    pub(crate) looks: u8,
-}
+/// As an exit: a way that no visit has shown.
+pub(super) const UNSEEN: u8 = 253;
 
-impl Label {
-    pub(crate) const NONE: Self = Self { mean: 0.0, scatter: 0.0, visits: 0, looks: 0 };
-
-    /// With one more label (Welford's update).
-    fn including(mut self, steps: u16) -> Self {
-        self.visits = self.visits.saturating_add(1);
-        let off = f32::from(steps) - self.mean;
-        self.mean += off / f32::from(self.visits);
-        self.scatter += off * (f32::from(steps) - self.mean);
-        self
-    }
-
-    /// The statistics of both.
-    pub(super) fn with(&self, other: &Self) -> Self {
-        if self.visits == 0 || other.visits == 0 {
-            return if self.visits == 0 { *other } else { *self };
-        }
-        let (here, there) = (f32::from(self.visits), f32::from(other.visits));
-        let off = other.mean - self.mean;
-        Self {
-            mean: self.mean + off * there / (here + there),
-            scatter: self.scatter + other.scatter + off * off * here * there / (here + there),
-            visits: self.visits.saturating_add(other.visits),
-            looks: self.looks.saturating_add(other.looks),
-        }
-    }
-
-    /// The rounded mean.
-    pub(super) fn fingerprint(&self) -> Fingerprint {
-        Fingerprint::from_steps((self.mean + 0.5) as u16).unwrap_or(Fingerprint::MAX)
-    }
-
-    pub(super) fn evidence(&self, model: &Model) -> f32 {
-        model.labels.evidence_of_labels(self.visits, self.scatter)
-    }
-}
+/// The largest number of darts of a hypothesis.
+pub(super) const DARTS_MAX: usize = 253;
 
 /// Where the robot got to from the place before.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -71,10 +32,12 @@ pub(super) enum Target {
     New,
     /// This way of a vertex that is on the map.
     At(u8),
+    /// A place that has no vertex on the map, and for which the map has no room.
+    OffMap,
 }
 
-/// One way to explain the newest place: the way by which the robot left, [`NONE`] at the first place of a sequence, and where it
-/// got to.
+/// One way to explain the newest place: the way by which the robot left, [`NONE`] at the first place of a sequence and [`UNSEEN`] for
+/// a way that no visit has shown, and where it got to.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Choice {
     pub(super) exit: u8,
@@ -87,6 +50,8 @@ pub(super) enum ReportedExit {
     Unknown,
     /// This way.
     Way(u8),
+    /// A way that no visit has shown.
+    Unseen,
     /// Any but this one, by which it came.
     NotBack(u8),
 }
@@ -97,11 +62,34 @@ impl ReportedExit {
         let report = match self {
             Self::Unknown => 0.0,
             Self::Way(way) if way == exit => model.right_exit,
-            Self::Way(_) => model.ln_wrong_exit(ways.saturating_sub(1)),
+            Self::Unseen if exit == UNSEEN => model.right_exit,
+            Self::Way(_) | Self::Unseen => model.ln_wrong_exit(ways.saturating_sub(1)),
             Self::NotBack(came_by) if came_by != exit => model.right_exit,
             Self::NotBack(_) => model.ln_wrong_exit(1),
         };
         report - model.ln_of(ways)
+    }
+}
+
+/// What an edge from one frontier to another does to the map.
+#[derive(Clone, Copy)]
+struct Closures {
+    /// The darts in the face of the first frontier.
+    face: DartSet,
+    /// The vertices that edges connect with it.
+    connected: VertexSet,
+    /// How many frontiers the map has.
+    frontiers: u8,
+}
+
+impl Closures {
+    const NONE: Self = Self { face: DartSet::EMPTY, connected: VertexSet::EMPTY, frontiers: 0 };
+
+    /// Whether an edge to a frontier leaves the genus as it is.
+    fn keep_genus(&self, exit: u8, frontier: u8, vertex: u8) -> bool {
+        exit == UNSEEN
+            || self.face.contains(frontier)
+            || VertexId::new(vertex).is_none_or(|vertex| !self.connected.contains(vertex))
     }
 }
 
@@ -127,7 +115,7 @@ pub(crate) struct Hypothesis<const V: usize, const D: usize, const T: usize> {
     pub(crate) label_evidence: f32,
     /// All evidence but that of the labels.
     pub(crate) rest: f32,
-    /// Identifies the map; vertices are numbered in the order of their first visit.
+    /// A hash of the edges.
     pub(crate) map_key: u32,
     /// The way by which the robot came to each place of the record.
     pub(crate) path: [u8; T],
@@ -168,80 +156,13 @@ impl<const V: usize, const D: usize, const T: usize> Hypothesis<V, D, T> {
     }
 
     pub(super) fn key(&self) -> u32 {
-        keyed(self.map_key, self.map.vertex(self.at), self.at)
+        keyed(self.map_key, self.at)
     }
 
     /// Weighs all labels again, for a new scale of the noise.
     pub(super) fn weigh_labels(&mut self, model: &Model) {
         self.label_evidence =
             self.labels.iter().take(usize::from(self.map.vertices())).map(|label| label.evidence(model)).sum();
-    }
-
-    /// Which way of a vertex each of the other ways seen is, the robot having come by `reference`, and how far it is off; the
-    /// closest first.
-    fn identify(&self, entry: &Entry, vertex: u8, reference: u8) -> [(u8, i16); WAYS - 1] {
-        let base = self.map.bearing(reference);
-        let ways = self.map.ways(vertex);
-        let mut found = [(NONE, 0); WAYS - 1];
-        for _ in ways {
-            let mut best = (NONE, 0, 0, SAME_WAY + 1);
-            for (slot, bearing) in entry.others().enumerate() {
-                if found.get(slot).is_none_or(|&(way, _)| way != NONE) {
-                    continue;
-                }
-                let target = base.wrapping_add(bearing);
-                for &way in ways {
-                    let off = target.wrapping_sub(self.map.bearing(way)) as i16;
-                    if way != reference && off.unsigned_abs() < best.3 && found.iter().all(|&(taken, _)| taken != way) {
-                        best = (way, off, slot, off.unsigned_abs());
-                    }
-                }
-            }
-            let (way, off, slot, _) = best;
-            match found.get_mut(slot).filter(|_| way != NONE) {
-                Some(slot) => *slot = (way, off),
-                None => break,
-            }
-        }
-        found
-    }
-
-    /// How far the mean bearing of the way that the robot came by seems to be off, and how much the offs of the others weigh.
-    fn reference_off(&self, found: &[(u8, i16)], reference: u8) -> (f32, f32) {
-        let (mut sum, mut weight) = (0.0, 0.0);
-        for &(way, off) in found.iter().filter(|(way, _)| self.map.seen(*way) > 0) {
-            let seen = f32::from(self.map.seen(way));
-            let share = seen / (seen + 1.0);
-            sum += share * f32::from(off);
-            weight += share;
-        }
-        let known = f32::from(self.map.seen(reference));
-        (sum / (weight + known).max(1.0), weight)
-    }
-
-    /// ln P of the ways seen at a vertex that the robot came to by `reference`.
-    fn ways_evidence(&self, model: &Model, entry: &Entry, vertex: u8, reference: u8) -> f32 {
-        if entry.count() == 0 {
-            return 0.0;
-        }
-        let looks = self.label(vertex).looks;
-        let others = usize::from(entry.count()) - 1;
-        let found = self.identify(entry, vertex, reference);
-        let (reference_off, weight) = self.reference_off(&found, reference);
-        let mut evidence = model.reference(reference_off, self.map.seen(reference), looks, weight);
-        for &(way, off) in found.iter().take(others) {
-            evidence += if way == NONE {
-                model.way_new(looks)
-            } else {
-                model.way_seen(self.map.seen(way), looks, f32::from(off) - reference_off)
-            };
-        }
-        for &way in self.map.ways(vertex) {
-            if way != reference && found.iter().all(|&(seen, _)| seen != way) {
-                evidence += model.way_missed(self.map.seen(way), looks);
-            }
-        }
-        evidence
     }
 
     /// What it gains to be at a vertex, having come there by `reference`.
@@ -289,8 +210,13 @@ impl<const V: usize, const D: usize, const T: usize> Hypothesis<V, D, T> {
         let target = self.map.bearing(from).wrapping_add(bearing);
         match self.map.nearest_way(self.map.vertex(from), target) {
             Some((way, off)) if off.unsigned_abs() <= SAME_WAY => ReportedExit::Way(way),
-            _ => ReportedExit::Unknown,
+            _ => ReportedExit::Unseen,
         }
+    }
+
+    /// Whether the robot's place is on the map.
+    pub(super) fn is_on_map(&self) -> bool {
+        self.at < UNSEEN
     }
 
     /// Proposes every way to explain observation `index`, with what it gains, but for those whose exit costs more than `worst`.
@@ -303,7 +229,10 @@ impl<const V: usize, const D: usize, const T: usize> Hypothesis<V, D, T> {
         mut proposed: impl FnMut(Choice, Gain),
     ) {
         let entry = record.get(index);
-        if self.at == NONE || entry.starts() {
+        if !self.has_room(Choice { exit: NONE, target: Target::New }) {
+            proposed(Choice { exit: NONE, target: Target::OffMap }, Gain { labels: 0.0, rest: LN_OFF_MAP });
+        }
+        if !self.is_on_map() || entry.starts() {
             let mut propose = |target| {
                 let choice = Choice { exit: NONE, target };
                 proposed(choice, self.gain(model, &entry, ReportedExit::Unknown, choice));
@@ -314,16 +243,21 @@ impl<const V: usize, const D: usize, const T: usize> Hypothesis<V, D, T> {
             return;
         }
         let reported = self.reported_exit(record, index, self.at);
-        let ways = self.map.ways(self.map.vertex(self.at));
-        for &exit in ways {
+        let vertex = self.map.vertex(self.at);
+        let ways = self.map.ways(vertex);
+        let may_be_unseen = reported == ReportedExit::Unseen
+            || self.label(vertex).looks == 0 && !matches!(reported, ReportedExit::Way(_));
+        for &exit in ways.iter().chain(may_be_unseen.then_some(&UNSEEN)) {
             if reported.ln(model, exit, ways.len()) < worst {
                 continue;
             }
+            let is_known = self.map.partner(exit).is_some();
+            let closures = if is_known { Closures::NONE } else { self.closures(exit) };
             let mut propose = |target| {
                 let choice = Choice { exit, target };
-                proposed(choice, self.gain(model, &entry, reported, choice));
+                proposed(choice, self.gain_with(model, &entry, reported, choice, &closures));
             };
-            if self.map.partner(exit).is_some() {
+            if is_known {
                 propose(Target::Known);
                 continue;
             }
@@ -338,94 +272,148 @@ impl<const V: usize, const D: usize, const T: usize> Hypothesis<V, D, T> {
 
     /// What a choice gains, given what the robot reported of its exit.
     pub(super) fn gain(&self, model: &Model, entry: &Entry, reported: ReportedExit, choice: Choice) -> Gain {
+        let is_closure = matches!(choice.target, Target::At(_)) && choice.exit != NONE;
+        let closures = if is_closure { self.closures(choice.exit) } else { Closures::NONE };
+        self.gain_with(model, entry, reported, choice, &closures)
+    }
+
+    /// As [`Hypothesis::gain`], with the closures of the exit.
+    fn gain_with(
+        &self,
+        model: &Model,
+        entry: &Entry,
+        reported: ReportedExit,
+        choice: Choice,
+        closures: &Closures,
+    ) -> Gain {
         let Choice { exit, target } = choice;
         let mut gain = match target {
             Target::New => self.new_arrival(model, entry),
             Target::At(dart) => self.arrival(model, entry, dart),
             Target::Known => self.arrival(model, entry, self.map.partner(exit).unwrap_or(NONE)),
+            Target::OffMap => return Gain { labels: 0.0, rest: LN_OFF_MAP },
         };
         if exit == NONE {
             gain.rest -= if target == Target::New { 0.0 } else { model.ln_of(self.map.darts().into()) };
             return gain;
         }
-        let ways = self.map.ways(self.map.vertex(exit)).len();
-        gain.rest += reported.ln(model, exit, ways);
+        let vertex = self.map.vertex(self.at);
+        let ways = self.map.ways(vertex).len();
+        gain.rest += match exit {
+            UNSEEN => reported.ln(model, exit, ways + 1) + model.way_unseen(self.label(vertex).looks),
+            _ => reported.ln(model, exit, ways),
+        };
         gain.rest += match target {
             Target::Known => model.travel(self.map.travel(exit), entry.ln_travel),
-            Target::New => model.travel((0, 0), entry.ln_travel),
-            Target::At(dart) => model.travel((0, 0), entry.ln_travel) + self.closure(model, exit, dart),
+            Target::New | Target::OffMap => model.travel((0, 0), entry.ln_travel),
+            Target::At(dart) => {
+                model.travel((0, 0), entry.ln_travel) + {
+                    let vertex = self.map.vertex(dart);
+                    model.closure(closures.frontiers.into(), closures.keep_genus(exit, dart, vertex))
+                }
+            }
         };
         gain
     }
 
-    /// What it gains that an edge joins two frontiers.
-    fn closure(&self, model: &Model, exit: u8, frontier: u8) -> f32 {
-        let keeps_genus = self.map.share_face(exit, frontier)
-            || !self.map.are_connected(self.map.vertex(exit), self.map.vertex(frontier));
-        model.closure(self.map.frontiers().count(), keeps_genus)
+    /// What an edge from an exit to each frontier does to the map. Cost: O(D).
+    fn closures(&self, exit: u8) -> Closures {
+        let frontiers = self.map.frontiers().count() as u8;
+        if exit == UNSEEN {
+            return Closures { frontiers, ..Closures::NONE };
+        }
+        let connected = self.map.component_of(self.map.vertex(exit));
+        Closures { face: self.map.face_of(exit), connected, frontiers }
     }
 
     /// The key that the hypothesis would have.
     pub(super) fn key_with(&self, choice: Choice) -> u32 {
-        match choice.target {
-            Target::Known => {
-                let at = self.map.partner(choice.exit).unwrap_or(NONE);
-                keyed(self.map_key, self.map.vertex(at), at)
-            }
-            Target::New => {
-                let key = edge_key(self.map.vertex(choice.exit), self.map.vertices());
-                keyed(self.map_key.wrapping_add(key), self.map.vertices(), self.map.darts())
-            }
-            Target::At(dart) if choice.exit == NONE => keyed(self.map_key, self.map.vertex(dart), dart),
-            Target::At(dart) => {
-                let key = edge_key(self.map.vertex(choice.exit), self.map.vertex(dart));
-                keyed(self.map_key.wrapping_add(key), self.map.vertex(dart), dart)
-            }
-        }
+        // A way that no visit has shown is added first.
+        let darts = self.map.darts();
+        let (exit, added) = if choice.exit == UNSEEN { (darts, darts.saturating_add(1)) } else { (choice.exit, darts) };
+        let (at, is_joined) = match choice.target {
+            Target::Known => (self.map.partner(choice.exit).unwrap_or(NONE), false),
+            Target::New => (added, exit != NONE),
+            Target::At(dart) => (dart, exit != NONE),
+            Target::OffMap => (OFF_MAP, false),
+        };
+        let map_key = if is_joined { self.map_key.wrapping_add(edge_key(exit, at)) } else { self.map_key };
+        keyed(map_key, at)
     }
 
     /// Whether there is room for what a choice adds.
     pub(super) fn has_room(&self, choice: Choice) -> bool {
-        choice.target != Target::New
-            || usize::from(self.map.vertices()) < V && usize::from(self.map.darts()) + WAYS <= D
+        let unseen = usize::from(choice.exit == UNSEEN);
+        let vertices = usize::from(choice.target == Target::New);
+        usize::from(self.map.vertices()) + vertices <= V
+            && usize::from(self.map.darts()) + vertices * WAYS + unseen <= D
+            && (unseen == 0 || self.map.ways(self.map.vertex(self.at)).len() < WAYS)
     }
 
-    /// Explains observation `index` by a choice; `frame` is the bearing of the first way of a new vertex.
-    pub(super) fn extend(&mut self, entry: &Entry, index: usize, choice: Choice, gain: Gain, frame: Bearing) {
+    /// Explains observation `index` by a choice; `frame` is the bearing of the first way of a new vertex. Returns whether a way
+    /// that was seen found no room.
+    pub(super) fn extend(&mut self, entry: &Entry, index: usize, choice: Choice, gain: Gain, frame: Bearing) -> bool {
+        self.label_evidence += gain.labels;
+        self.rest += gain.rest;
+        let exit = match choice.exit {
+            UNSEEN => self.map.add_way(self.map.vertex(self.at), self.unseen_bearing(entry)).unwrap_or(NONE),
+            exit => exit,
+        };
         let at = match choice.target {
-            Target::Known => self.map.partner(choice.exit).unwrap_or(NONE),
+            Target::Known => self.map.partner(exit).unwrap_or(NONE),
             Target::New => {
-                let Some(vertex) = self.map.add_vertex() else { return };
+                let vertex = self.map.add_vertex().unwrap_or(NONE);
                 if let Some(label) = self.labels.get_mut(usize::from(vertex)) {
                     *label = Label::NONE;
                 }
                 self.map.add_way(vertex, frame).unwrap_or(NONE)
             }
             Target::At(dart) => dart,
+            Target::OffMap => OFF_MAP,
         };
-        if choice.target != Target::Known && choice.exit != NONE {
-            self.map.join(choice.exit, at);
-        }
         self.at = at;
         if let Some(slot) = self.path.get_mut(index) {
             *slot = at;
         }
-        if entry.ln_travel > 0 && choice.exit != NONE {
+        if choice.target == Target::OffMap {
+            return false;
+        }
+        if choice.target != Target::Known && exit != NONE {
+            self.map.join(exit, at);
+            self.map_key = self.map_key.wrapping_add(edge_key(exit, at));
+        }
+        if entry.ln_travel > 0 && exit != NONE {
             self.map.time(at, entry.ln_travel);
         }
+        self.visit(entry, at)
+    }
+
+    /// The bearing of an exit that no visit has shown: the reported one, or the middle of the widest gap.
+    fn unseen_bearing(&self, entry: &Entry) -> Bearing {
+        if let Some(Exit::Bearing(bearing)) = entry.exit() {
+            return self.map.bearing(self.at).wrapping_add(u16::from(bearing) << 8);
+        }
+        let gap =
+            |way: u8| self.map.bearing(self.map.next_way(way)).wrapping_sub(self.map.bearing(way)).wrapping_sub(1);
+        let ways = self.map.ways(self.map.vertex(self.at));
+        let before = ways.iter().copied().max_by_key(|&way| gap(way)).unwrap_or(self.at);
+        self.map.bearing(before).wrapping_add(gap(before) / 2)
+    }
+
+    /// Takes observation `index` for a visit by a way, on a map that does not change.
+    pub(super) fn follow_to(&mut self, index: usize, at: u8, gain: Gain) {
         self.label_evidence += gain.labels;
         self.rest += gain.rest;
-        self.visit(entry, at);
-        self.map_key = self.key_of_edges();
+        self.at = at;
+        if let Some(slot) = self.path.get_mut(index) {
+            *slot = at;
+        }
     }
 
     /// Halves the counts of vertices that were visited more often than their means need.
     pub(super) fn fade(&mut self, model: &Model) {
         for label in self.labels.iter_mut().take(usize::from(self.map.vertices())) {
-            if label.visits >= FADE_VISITS {
-                label.visits /= 2;
-                label.scatter *= 0.5;
-            }
+            label.fade();
         }
         self.weigh_labels(model);
     }
@@ -435,17 +423,8 @@ impl<const V: usize, const D: usize, const T: usize> Hypothesis<V, D, T> {
         self.path.copy_within(count.min(T).., 0);
     }
 
-    /// Leaves open where the robot is at a place.
-    pub(super) fn lose_way(&mut self, index: usize) {
-        self.at = NONE;
-        self.rest -= LOST;
-        if let Some(slot) = self.path.get_mut(index) {
-            *slot = NONE;
-        }
-    }
-
-    /// Counts a visit.
-    fn visit(&mut self, entry: &Entry, at: u8) {
+    /// Counts a visit. Returns whether a way that was seen found no room.
+    fn visit(&mut self, entry: &Entry, at: u8) -> bool {
         let vertex = self.map.vertex(at);
         let found = self.identify(entry, vertex, at);
         let looks = u8::from(entry.count() > 0);
@@ -457,21 +436,22 @@ impl<const V: usize, const D: usize, const T: usize> Hypothesis<V, D, T> {
         self.map.turn(at, -reference_off);
         self.map.see(at, 0);
         let base = self.map.bearing(at);
+        let mut lacks_room = false;
         for (bearing, (way, off)) in entry.others().zip(found) {
-            if way == NONE {
-                if let Some(way) = self.map.add_way(vertex, base.wrapping_add(bearing)) {
-                    self.map.see(way, 0);
-                }
-            } else {
+            if way != NONE {
                 self.map.see(way, off.saturating_sub(reference_off));
+            } else if let Some(way) = self.map.add_way(vertex, base.wrapping_add(bearing)) {
+                self.map.see(way, 0);
+            } else {
+                lacks_room |= usize::from(self.map.darts()) >= D;
             }
         }
+        lacks_room
     }
 
-    /// The key of the edges of the map.
-    fn key_of_edges(&self) -> u32 {
-        let key = |(a, b)| edge_key(self.map.vertex(a), self.map.vertex(b));
-        self.map.edges().map(key).fold(0, u32::wrapping_add)
+    /// Computes the key of the map from its edges. Cost: O(D).
+    pub(super) fn rekey(&mut self) {
+        self.map_key = self.map.edges().map(|(a, b)| edge_key(a, b)).fold(0, u32::wrapping_add);
     }
 }
 
@@ -481,98 +461,11 @@ fn mix(value: u32) -> u32 {
     value ^ value >> 16
 }
 
+/// Darts are numbered in the order of the places at which they were seen first, so equal maps have equal numbers.
 fn edge_key(a: u8, b: u8) -> u32 {
     mix(0x1_0000 | u32::from(a.min(b)) << 8 | u32::from(a.max(b)))
 }
 
-fn keyed(map_key: u32, vertex: u8, dart: u8) -> u32 {
-    map_key ^ mix(0x2_0000 | u32::from(vertex) << 8 | u32::from(dart))
-}
-
-#[cfg(test)]
-mod tests {
-    use super::super::config::OrderedConfig;
-    use super::*;
-    use crate::filter::{Observation, Ways};
-
-    type Small = Hypothesis<4, 20, 8>;
-
-    fn entry(bearings_mrad: &[u16]) -> Entry {
-        let ways = Ways::from_bearings_mrad(bearings_mrad).ok();
-        Entry::new(&Observation { ways, ..Observation::new(Fingerprint::from_steps(500).unwrap()) })
-    }
-
-    /// A vertex whose ways have bearings in radians and were seen so often.
-    fn vertex(ways: &[(f64, u8)], looks: u8) -> Small {
-        let mut hypothesis = Small::ZERO;
-        let vertex = hypothesis.map.add_vertex().unwrap();
-        for &(bearing_rad, seen) in ways {
-            let bearing = (bearing_rad / core::f64::consts::TAU * 65536.0) as u16;
-            let way = hypothesis.map.add_way(vertex, bearing).unwrap();
-            (0..seen).for_each(|_| hypothesis.map.see(way, 0));
-        }
-        hypothesis.labels[0] = Label { mean: 500.0, scatter: 50.0, visits: looks.into(), looks };
-        hypothesis
-    }
-
-    fn normal(off: f64, variance: f64) -> f64 {
-        (-off * off / (2.0 * variance)).exp() / (core::f64::consts::TAU * variance).sqrt()
-    }
-
-    /// ln P of the bearings of ways by a sum over the offset of the way that the robot came by.
-    fn summed(offs_rad: &[(f64, f64)], seen_reference: f64) -> f64 {
-        let variance = 0.01;
-        let step = 1e-4;
-        let sum: f64 = (-20_000..20_000)
-            .map(|index| {
-                let offset = f64::from(index) * step;
-                let others = offs_rad.iter().map(|&(off, seen)| normal(off - offset, variance * (1.0 + 1.0 / seen)));
-                normal(offset, variance / seen_reference) * others.product::<f64>() * step
-            })
-            .sum();
-        sum.ln()
-    }
-
-    #[test]
-    fn the_evidence_of_bearings_is_that_of_a_sum_over_the_reference() {
-        let mut model = Model::new();
-        model.configure(&OrderedConfig::DEFAULT.with_noise_mm(20));
-        let ways = [(0.5, 3), (2.0, 2), (4.0, 3)];
-        let hypothesis = vertex(&ways, 3);
-        for (first, second) in [(1500, 3500), (1620, 3560), (1400, 3650), (1700, 3700)] {
-            let entry = entry(&[first, second]);
-            let reference = hypothesis.map.ways(0)[0];
-            let evidence = f64::from(hypothesis.ways_evidence(&model, &entry, 0, reference));
-            let offs = [(f64::from(first) / 1000.0 - 1.5, 2.0), (f64::from(second) / 1000.0 - 3.5, 3.0)];
-            // Both were seen: of 3 looks with a prior weight of 20, at 2 and 3 of them.
-            let hits = ((2.0 + 19.0) / 23.0_f64).ln() + ((3.0 + 19.0) / 23.0_f64).ln();
-            let expected = summed(&offs, 3.0) + hits;
-            // Bearings of the record are rounded to 25 mrad.
-            assert!((evidence - expected).abs() < 0.35, "{evidence} {expected}");
-        }
-    }
-
-    #[test]
-    fn a_way_is_identified_by_its_bearing_whichever_others_were_missed() {
-        let hypothesis = vertex(&[(0.0, 1), (1.0, 1), (2.5, 1), (4.5, 1)], 1);
-        let ways: Vec<u8> = hypothesis.map.ways(0).to_vec();
-        let found = hypothesis.identify(&entry(&[2400, 4700]), 0, ways[0]);
-        assert_eq!([found[0].0, found[1].0], [ways[2], ways[3]]);
-        assert!(found[2..].iter().all(|&(way, _)| way == NONE));
-        // Two close ways: the closest pair goes first.
-        let found = hypothesis.identify(&entry(&[700, 1100]), 0, ways[0]);
-        assert_eq!([found[0].0, found[1].0], [NONE, ways[1]]);
-    }
-
-    #[test]
-    fn a_missed_way_costs_less_than_a_vertex_with_another_number_of_ways() {
-        let mut model = Model::new();
-        model.configure(&OrderedConfig::DEFAULT.with_noise_mm(20));
-        let hypothesis = vertex(&[(0.0, 4), (1.5, 4), (3.0, 4)], 4);
-        let reference = hypothesis.map.ways(0)[0];
-        let evidence = |bearings: &[u16]| hypothesis.ways_evidence(&model, &entry(bearings), 0, reference);
-        assert!(evidence(&[1500, 3000]) > evidence(&[1500]));
-        assert!(evidence(&[1500]) > evidence(&[1500, 3000, 4500]) - 6.0);
-        assert!(evidence(&[700, 4500]) < evidence(&[1500]) - 6.0);
-    }
+fn keyed(map_key: u32, at: u8) -> u32 {
+    map_key ^ mix(0x2_0000 | u32::from(at))
 }

@@ -8,6 +8,9 @@ mod beam;
 mod config;
 mod fold;
 mod hypothesis;
+mod label;
+mod localise;
+mod logarithm;
 mod model;
 mod noise;
 mod publish;
@@ -16,12 +19,15 @@ mod repair;
 mod replay;
 #[cfg(test)]
 mod tests;
+mod translation;
+mod ways_evidence;
 
 pub use config::OrderedConfig;
 
 #[cfg(feature = "snapshot")]
 pub(crate) use {
-    hypothesis::{Hypothesis as OrderedHypothesis, Label as OrderedLabel},
+    hypothesis::{Hypothesis as OrderedHypothesis, OFF_MAP},
+    label::Label as OrderedLabel,
     record::Entry as OrderedEntry,
 };
 
@@ -33,16 +39,19 @@ use crate::map::darts::{DartMap, NONE};
 use crate::map::{DartId, Darts, Map, PerVertex, VertexId};
 use beam::Beam;
 use fold::Union;
-use hypothesis::Hypothesis;
+use hypothesis::{DARTS_MAX, Hypothesis};
 use model::{Model, SAME_WAY};
 use record::{Entry, Record};
 pub(crate) use repair::Repair;
-use replay::Translation;
+use translation::Translation;
+
+/// A way that was seen at fewer than one of this many visits may be none.
+const DOUBTFUL_LOOKS: u16 = 6;
 
 /// The noise is estimated at every fifth place from here on.
 const NOISE_FROM: u32 = 10;
 
-/// The ordered filter with at most `N` hypotheses, maps of at most `V` vertices (1 to 64) and `D` darts (2 to 254), and a history of
+/// The ordered filter with at most `N` hypotheses, maps of at most `V` vertices (1 to 64) and `D` darts (2 to 253), and a history of
 /// the newest `T` places. Repairs can revise what the history contains.
 ///
 /// The filter is const-constructed, to zero, so that a `static` of it is in `.bss`, and initialised in place by [`Filter::start`]. Memory:
@@ -73,6 +82,8 @@ pub struct OrderedFilter<const N: usize, const V: usize, const D: usize, const T
     pub(crate) observed: u32,
     pub(crate) refined: u32,
     pub(crate) model: Model,
+    /// The first place of the record since the filter only localises; `None` while it maps.
+    pub(crate) localised_from: Option<usize>,
     pub(crate) record: Record<T>,
     pub(crate) beam: Beam<N, V, D, T>,
     pub(crate) draft: Hypothesis<V, D, T>,
@@ -101,6 +112,7 @@ impl<const N: usize, const V: usize, const D: usize, const T: usize> OrderedFilt
     pub const fn new() -> Self {
         const {
             assert!(N >= 1 && N <= 255, "a filter has 1 to 255 hypotheses");
+            assert!(D <= DARTS_MAX, "a map has 2 to 253 darts");
             assert!(T >= 8 && T <= 16384, "a history has 8 to 16384 places");
         }
         Self {
@@ -109,6 +121,7 @@ impl<const N: usize, const V: usize, const D: usize, const T: usize> OrderedFilt
             observed: 0,
             refined: 0,
             model: Model::new(),
+            localised_from: None,
             record: Record::new(),
             beam: Beam::new(),
             draft: Hypothesis::ZERO,
@@ -132,6 +145,11 @@ impl<const N: usize, const V: usize, const D: usize, const T: usize> OrderedFilt
     /// How many places were observed.
     pub const fn observed(&self) -> u32 {
         self.observed
+    }
+
+    /// Publishes the best map without another place: the result of [`Filter::refine`] so far.
+    pub fn refresh(&mut self) -> Update {
+        self.publish()
     }
 
     /// Takes hints that contradict the place before out of an observation, and records the faults.
@@ -161,7 +179,7 @@ impl<const N: usize, const V: usize, const D: usize, const T: usize> OrderedFilt
     /// Drops the oldest quarter of the record. The best hypothesis decides what it meant; its counts stay, as the base of all
     /// hypotheses from now on. Cost: as a refinement of all places.
     fn drop_oldest(&mut self) {
-        self.repair = Repair::NONE;
+        self.repair_nothing();
         let (len, dropped) = (self.record.len(), (self.record.len() / 4).max(1));
         if let Some(best) = self.beam.get(0) {
             self.source.clone_from(best);
@@ -169,22 +187,41 @@ impl<const N: usize, const V: usize, const D: usize, const T: usize> OrderedFilt
         let forgotten = self.base.rest;
         let before = self.rebuild(0, dropped);
         self.draft.fade(&self.model);
+        self.remove_doubtful_ways();
         self.base.clone_from(&self.draft);
         self.base.rest = 0.0;
-        if before.is_none() || self.rebuild(dropped, len).is_none() {
-            // A map that contradicts its own path: it stays as it is, and nothing of it can be explained in another way.
-            self.base.clone_from(&self.source);
-            self.base.rest = 0.0;
-            self.draft.clone_from(&self.base);
-            self.record.clear();
-            self.beam.begin_with(&self.draft);
-            return;
+        if before.is_some() && self.rebuild(dropped, len).is_some() {
+            self.draft.rest -= forgotten;
+            self.draft.forget_oldest(dropped);
+            self.record.drop_oldest(dropped);
+            self.path.copy_within(dropped.min(T).., 0);
+        } else {
+            self.forget_record();
         }
-        self.draft.rest -= forgotten;
-        self.draft.forget_oldest(dropped);
-        self.record.drop_oldest(dropped);
-        self.path.copy_within(dropped.min(T).., 0);
-        self.beam.begin_with(&self.draft);
+        self.beam.start_with(&self.draft);
+    }
+
+    /// Removes ways from the draft that few visits have shown and nobody has driven, so that the table of darts does not fill with
+    /// errors of the detector.
+    fn remove_doubtful_ways(&mut self) {
+        let (source, translation) = (&self.source, &self.translation);
+        let is_doubtful = |dart: u8| {
+            let looks = source.label(source.map.vertex(dart)).looks;
+            source.map.partner(dart).is_none() && u16::from(source.map.seen(dart)) * DOUBTFUL_LOOKS < u16::from(looks)
+        };
+        let numbers = self.draft.map.remove_frontiers(|image| translation.preimage(image).is_some_and(is_doubtful));
+        self.translation.renumber(&numbers);
+        self.draft.at = numbers.get(usize::from(self.draft.at)).copied().unwrap_or(self.draft.at);
+        self.draft.rekey();
+    }
+
+    /// Makes the source the draft and the base, for a map that contradicts its own path: it stays as it is, and nothing of it can be
+    /// explained in another way.
+    fn forget_record(&mut self) {
+        self.base.clone_from(&self.source);
+        self.base.rest = 0.0;
+        self.draft.clone_from(&self.base);
+        self.record.clear();
     }
 
     fn estimate_noise(&mut self) {
@@ -219,17 +256,10 @@ impl<const N: usize, const V: usize, const D: usize, const T: usize> OrderedFilt
             *slot = dart;
         }
         self.rebuild(0, path.len())?;
-        self.repair = Repair::NONE;
-        self.beam.begin_with(&self.draft);
+        self.repair_nothing();
+        self.beam.start_with(&self.draft);
         self.publish();
         Some(self.draft.score())
-    }
-
-    /// Publishes the result of refinement steps; for evaluations.
-    #[doc(hidden)]
-    #[cfg(feature = "_test")]
-    pub fn refresh(&mut self) {
-        self.publish();
     }
 }
 
@@ -250,6 +280,7 @@ impl<const N: usize, const V: usize, const D: usize, const T: usize> Filter<V> f
         self.observed = 0;
         self.refined = 0;
         self.model.configure(&config);
+        self.localised_from = None;
         self.record.clear();
         self.beam.clear();
         self.base.clear();
@@ -280,18 +311,32 @@ impl<const N: usize, const V: usize, const D: usize, const T: usize> Filter<V> f
         if self.beam.is_empty() {
             return Update::NONE;
         }
+        if self.is_localise_only() && self.map.vertices().len() == 0 {
+            // No hypothesis has a vertex for it.
+            let place_index = self.observed;
+            self.observed = self.observed.wrapping_add(1);
+            return Update { place_index, ..Update::NONE };
+        }
         let observation = self.checked(observation.into());
         if self.record.is_full() {
             self.faults.record(FaultKind::HistoryFull);
-            self.drop_oldest();
+            if self.is_localise_only() {
+                self.drop_oldest_localised();
+            } else {
+                self.drop_oldest();
+            }
         }
         let index = self.record.len();
         self.record.push(Entry::new(&observation));
+        self.refined = 0;
+        self.observed = self.observed.wrapping_add(1);
+        if self.is_localise_only() {
+            self.localise(index);
+            return self.publish();
+        }
         if self.beam.grow(&self.model, &self.record, index) {
             self.faults.record(FaultKind::VerticesFull);
         }
-        self.refined = 0;
-        self.observed = self.observed.wrapping_add(1);
         if self.observed >= NOISE_FROM && self.observed.is_multiple_of(5) {
             self.estimate_noise();
         }
@@ -300,7 +345,9 @@ impl<const N: usize, const V: usize, const D: usize, const T: usize> Filter<V> f
 
     /// Runs a part of a repair, or all of it if it is short. Cost: at most 300 places that are followed, or 25 decisions.
     fn refine(&mut self) {
-        self.repair();
+        if !self.is_localise_only() {
+            self.repair();
+        }
     }
 
     fn map(&self) -> &Map<V> {

@@ -1,8 +1,10 @@
 //! The model: ln P of exits, ways, travel times and closures.
 
 use super::config::OrderedConfig;
+use super::logarithm;
 use super::record::LN_UNIT;
 use crate::filter::robust::model::Model as LabelModel;
+use crate::filter::robust::special_functions::HALF_LN_2_PI;
 use crate::place::Fingerprint;
 
 /// Counts from here on are taken as this.
@@ -69,8 +71,6 @@ pub(crate) struct Model {
     /// ln P of a right report of the exit, and of a wrong one of one other way, two others and so on.
     pub(super) right_exit: f32,
     wrong_exit: [f32; 8],
-    /// ln k.
-    pub(super) ln: [f32; 256],
     missed: f32,
     false_way: f32,
     /// What a visit that is explained rightly gains, by the number of ways seen.
@@ -96,7 +96,6 @@ impl Model {
             travels: Predictive::new(),
             right_exit: 0.0,
             wrong_exit: [0.0; 8],
-            ln: [0.0; 256],
             missed: 0.0,
             false_way: 0.0,
             par: [0.0; 8],
@@ -115,12 +114,20 @@ impl Model {
         for (others, slot) in self.wrong_exit.iter_mut().enumerate() {
             *slot = libm::logf(wrong_exit / others.max(1) as f32);
         }
-        for (count, slot) in self.ln.iter_mut().enumerate() {
-            *slot = libm::logf(count.max(1) as f32);
-        }
         self.missed = libm::logf(self.missed_share);
         self.false_way = libm::logf(share(config.false_way_permille));
         self.set_noise(f32::from(config.noise_mm) / f32::from(Fingerprint::STEP_MM));
+    }
+
+    /// The evidence of the labels of a vertex: [`LabelModel::evidence_of_labels`], with tables.
+    pub(super) fn evidence_of_labels(&self, visits: u16, scatter: f32) -> f32 {
+        if visits == 0 {
+            return 0.0;
+        }
+        let shape = 1.5 + 0.5 * f32::from(visits);
+        self.labels.label_constant - f32::from(visits) * HALF_LN_2_PI - 0.5 * logarithm::ln(visits.into())
+            + logarithm::ln_gamma_of_labels(visits)
+            - shape * logarithm::ln(self.labels.scale + 0.5 * scatter)
     }
 
     /// Sets the standard deviation of the labels, in steps.
@@ -149,7 +156,7 @@ impl Model {
     }
 
     pub(super) fn ln_of(&self, count: usize) -> f32 {
-        self.ln.get(count).copied().unwrap_or(5.6)
+        logarithm::ln_of(count)
     }
 
     /// ln P of seeing a way that was seen at `seen` of `looks` visits, `off` from its mean bearing.
@@ -173,7 +180,7 @@ impl Model {
             if looks == 0 || weight == 0.0 {
                 return missed;
             }
-            return missed - LN_CIRCLE - self.bearings.ln_peak() - 0.5 * libm::logf(weight);
+            return missed - LN_CIRCLE - self.bearings.ln_peak() - 0.5 * logarithm::ln(weight);
         }
         if weight == 0.0 {
             return 0.0;
@@ -205,12 +212,17 @@ impl Model {
     }
 
     fn ln_ratio(&self, part: f32, whole: f32) -> f32 {
-        libm::logf(part / whole)
+        logarithm::ln(part / whole)
+    }
+
+    /// ln P that none of `looks` visits has shown a way.
+    pub(super) fn way_unseen(&self, looks: u8) -> f32 {
+        (f32::from(looks) * self.missed).max(self.false_way)
     }
 
     /// ln of the density of seeing a way that none of `looks` visits has shown.
     pub(super) fn way_new(&self, looks: u8) -> f32 {
-        (f32::from(looks) * self.missed).max(self.false_way) - LN_CIRCLE
+        self.way_unseen(looks) - LN_CIRCLE
     }
 
     /// ln of the density of a travel time on an edge that was driven `timed` times.

@@ -1,7 +1,7 @@
 //! What the filter publishes after a place: the best map with its vertex ids, the robot's place, and probabilities.
 
 use super::OrderedFilter;
-use super::hypothesis::Hypothesis;
+use super::hypothesis::{Hypothesis, UNSEEN};
 use crate::filter::worst_ngram::worst_ngram;
 use crate::filter::{OrderedFactors, Update, WeightFactors};
 use crate::map::darts::NONE;
@@ -32,7 +32,11 @@ impl<const N: usize, const V: usize, const D: usize, const T: usize> OrderedFilt
         let observations = self.path.iter().zip(&best.path).take(published).filter_map(pair);
         let label =
             |vertex: VertexId| Some(best.label(vertex.into())).filter(|held| held.visits >= 2).map(|held| held.mean);
-        self.vertex_ids.update::<T>(&self.map, vertices.into(), observations, label);
+        if self.is_localise_only() {
+            self.vertex_ids.keep(vertices.into());
+        } else {
+            self.vertex_ids.update::<T>(&self.map, vertices.into(), observations, label);
+        }
         let ids = &self.vertex_ids.ids;
         self.map.clear();
         for id in VertexId::first(vertices.into()) {
@@ -97,13 +101,15 @@ impl<const N: usize, const V: usize, const D: usize, const T: usize> OrderedFilt
         }
         self.belief_q16.iter_mut().zip(belief).for_each(|((_, slot), weight)| *slot = (weight / all * ONE_Q16) as u32);
         self.map_probability_q16 = (same / all * ONE_Q16) as u32;
-        let vertex = best.map.vertex(best.at);
+        // A place that is not on the map counts for the newest one that is.
+        let at = (0..self.record.len()).rev().map(|index| best.came_by(index)).find(|&dart| dart < UNSEEN);
+        let vertex = at.map_or(NONE, |at| best.map.vertex(at));
         let (labels, moves) = (best.label_evidence, best.rest);
         let lead_q16 = q16((-rival).clamp(-LEAD_MAX, LEAD_MAX));
         Update {
             place_index: self.observed.wrapping_sub(1),
             vertex: VertexId::new(vertex).map_or(VertexId::FIRST, |vertex| ids[vertex]),
-            is_new: best.label(vertex).visits == 1,
+            is_new: best.is_on_map() && best.label(vertex).visits == 1,
             consistency_mm: self.worst.distance_mm,
             factors: WeightFactors::Ordered(OrderedFactors { ln_labels_q16: q16(labels), ln_moves_q16: q16(moves) }),
             lead_q16,

@@ -7,6 +7,8 @@
 
 use super::OrderedFilter;
 use super::fold::{fit, fold};
+use super::hypothesis::{ReportedExit, UNSEEN};
+use super::logarithm::ln;
 use super::replay::Builder;
 use crate::filter::draws;
 use crate::map::darts::NONE;
@@ -32,6 +34,11 @@ const FOLDED: usize = 6;
 const RESTARTS: usize = 2;
 /// And so many start elsewhere on the map.
 const RELOCATED: usize = 4;
+/// Of the others so many forbid an edge that contradicts a reported exit.
+const DOUBTED: usize = 6;
+
+/// Of 16 repairs that forbid a decision so many decide all that follows again.
+const FREE: usize = 6;
 
 /// The noise of decisions is drawn up to this, in nats.
 const TEMPERATURE: f32 = 3.0;
@@ -46,6 +53,8 @@ enum Stray {
     Never,
     /// At the decision with this number.
     AtDecision(usize),
+    /// At this observation.
+    At(usize),
     /// From an observation on, for good.
     From(usize),
 }
@@ -108,6 +117,10 @@ impl<const N: usize, const V: usize, const D: usize, const T: usize> OrderedFilt
             Stray::Never
         } else if below(random, 16) < RESTARTS {
             Stray::From(1)
+        } else if below(random, 16) < DOUBTED
+            && let Some(at) = self.doubted_edge(random)
+        {
+            Stray::At(at)
         } else if below(random, 4) > 0 {
             // Some more than there are edges: exits that were doubted, and places that fit badly.
             Stray::AtDecision(below(random, self.source.map.edges().count() + 3))
@@ -118,6 +131,31 @@ impl<const N: usize, const V: usize, const D: usize, const T: usize> OrderedFilt
         self.repair = Repair { next: Some(0), stray, follows: true, temperature };
         self.start_draft();
         true
+    }
+
+    /// Draws a passage at which the source contradicts the reported exit, and returns the first passage of the edge that was
+    /// reported. `None` if there is no contradiction. Cost: O(T).
+    fn doubted_edge(&self, random: &mut Xoshiro128PlusPlus) -> Option<usize> {
+        let source = &self.source;
+        let mut doubted = 0_usize;
+        let mut chosen = None;
+        for index in 1..self.record.len() {
+            let before = source.came_by(index - 1);
+            if before >= UNSEEN || self.record.get(index).starts() {
+                continue;
+            }
+            if let ReportedExit::Way(exit) = source.reported_exit(&self.record, index, before)
+                && let Some(partner) = source.map.partner(exit)
+                && source.came_by(index) != partner
+            {
+                doubted += 1;
+                if below(random, doubted) == 0 {
+                    chosen = Some((exit, partner));
+                }
+            }
+        }
+        let (exit, partner) = chosen?;
+        source.path.iter().take(self.record.len()).position(|&came_by| came_by == exit || came_by == partner)
     }
 
     /// Builds on the draft; tells whether it explains the whole record.
@@ -137,9 +175,13 @@ impl<const N: usize, const V: usize, const D: usize, const T: usize> OrderedFilt
                 match &mut self.repair.stray {
                     Stray::AtDecision(0) if step.is_decision => {
                         forbidden = Some(step.choice);
-                        self.repair.stray = Stray::Never;
+                        self.repair.stray = if below(random, 16) < FREE { Stray::From(index) } else { Stray::Never };
                     }
                     Stray::AtDecision(left) if step.is_decision => *left -= 1,
+                    Stray::At(at) if *at == index => {
+                        forbidden = Some(step.choice);
+                        self.repair.stray = if below(random, 16) < FREE { Stray::From(index) } else { Stray::Never };
+                    }
                     _ => {}
                 }
                 if forbidden.is_none() {
@@ -161,6 +203,25 @@ impl<const N: usize, const V: usize, const D: usize, const T: usize> OrderedFilt
         }
         self.repair.next = Some(index);
         index == self.record.len()
+    }
+
+    /// Gives up the repair that is under way.
+    pub(super) fn repair_nothing(&mut self) {
+        self.repair = Repair::NONE;
+    }
+
+    /// Builds the draft along the path of the source, and decides where that contradicts itself. Returns whether the draft explains
+    /// the whole record.
+    pub(super) fn rebuild_with_decisions(&mut self) -> bool {
+        self.repair = Repair { next: Some(0), follows: true, ..Repair::NONE };
+        self.start_draft();
+        let mut random = draws(self.seed, u64::from(self.observed) << 16);
+        let mut is_whole = false;
+        while self.repair.next.is_some() && !is_whole {
+            is_whole = self.continue_repair(&mut random);
+        }
+        self.repair_nothing();
+        is_whole
     }
 
     /// The draft as it was before the record begins.
@@ -242,5 +303,5 @@ fn uniform(random: &mut Xoshiro128PlusPlus) -> f32 {
 
 /// Noise that makes the largest of perturbed logarithms a draw.
 fn gumbel(random: &mut Xoshiro128PlusPlus) -> f32 {
-    -libm::logf(-libm::logf(uniform(random)))
+    -ln(-ln(uniform(random)))
 }

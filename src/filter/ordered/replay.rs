@@ -1,8 +1,9 @@
 //! Building a map again from the record: along a given path, or by decisions that look ahead.
 
-use super::hypothesis::{Choice, Gain, Hypothesis, ReportedExit, Target};
-use super::model::{Model, SAME_WAY};
+use super::hypothesis::{Choice, Gain, Hypothesis, OFF_MAP, ReportedExit, Target, UNSEEN};
+use super::model::Model;
 use super::record::Record;
+use super::translation::Translation;
 use crate::filter::Exit;
 use crate::map::darts::NONE;
 
@@ -26,89 +27,6 @@ const OPEN: f32 = 3.0;
 
 /// How many choices are followed ahead.
 const FOLLOWED: usize = 8;
-
-/// Which vertex and dart of the map that is built stands for each of another map.
-#[derive(Clone, Debug)]
-pub(super) struct Translation<const V: usize, const D: usize> {
-    vertex: [u8; V],
-    dart: [u8; D],
-    is_image: [bool; D],
-}
-
-impl<const V: usize, const D: usize> Translation<V, D> {
-    pub(super) const fn new() -> Self {
-        Self { vertex: [0; V], dart: [0; D], is_image: [false; D] }
-    }
-
-    /// Starts with the first vertices and darts, which are the same in both maps.
-    pub(super) fn start(&mut self, vertices: u8, darts: u8) {
-        self.vertex.fill(NONE);
-        self.dart.fill(NONE);
-        self.is_image.fill(false);
-        (0..vertices).zip(&mut self.vertex).for_each(|(vertex, image)| *image = vertex);
-        (0..darts).zip(self.dart.iter_mut().zip(&mut self.is_image)).for_each(|(dart, (image, is_image))| {
-            *image = dart;
-            *is_image = true;
-        });
-    }
-
-    fn vertex(&self, vertex: u8) -> Option<u8> {
-        self.vertex.get(usize::from(vertex)).copied().filter(|&vertex| vertex != NONE)
-    }
-
-    fn set(&mut self, dart: u8, image: u8) {
-        if let (Some(slot), Some(is_image)) =
-            (self.dart.get_mut(usize::from(dart)), self.is_image.get_mut(usize::from(image)))
-        {
-            *slot = image;
-            *is_image = true;
-        }
-    }
-
-    /// The image of a dart whose vertex has one. It is found by its bearing: vertices keep their frames.
-    fn image<const T: usize>(
-        &mut self,
-        from: &Hypothesis<V, D, T>,
-        to: &mut Hypothesis<V, D, T>,
-        dart: u8,
-    ) -> Option<u8> {
-        let known = self.dart.get(usize::from(dart)).copied()?;
-        if known != NONE {
-            return Some(known);
-        }
-        let vertex = self.vertex(from.map.vertex(dart))?;
-        let mine = from.map.vertex(dart);
-        // The frames drift apart as bearings are averaged: what is known of the other ways says how far.
-        let (mut sum, mut count) = (0_i32, 0_i32);
-        for &way in from.map.ways(mine) {
-            if let Some(&image) = self.dart.get(usize::from(way)).filter(|&&image| image != NONE) {
-                sum += i32::from(to.map.bearing(image).wrapping_sub(from.map.bearing(way)) as i16);
-                count += 1;
-            }
-        }
-        let drift = (sum / count.max(1)) as i16;
-        let bearing = from.map.bearing(dart).wrapping_add_signed(drift);
-        let mut best = (None, SAME_WAY + 1);
-        for &way in to.map.ways(vertex) {
-            let off = |bearing: u16| (bearing.wrapping_sub(to.map.bearing(way)) as i16).unsigned_abs();
-            if off(bearing) >= best.1 || self.is_image.get(usize::from(way)) != Some(&false) {
-                continue;
-            }
-            // Another dart without an image may be closer.
-            let closer = |&other: &u8| {
-                self.dart.get(usize::from(other)) == Some(&NONE)
-                    && from.map.vertex(other) == mine
-                    && off(from.map.bearing(other).wrapping_add_signed(drift)) < off(bearing)
-            };
-            if !from.map.ways(mine).iter().any(closer) {
-                best = (Some(way), off(bearing));
-            }
-        }
-        let image = best.0.or_else(|| to.map.add_way(vertex, bearing))?;
-        self.set(dart, image);
-        Some(image)
-    }
-}
 
 /// How a hypothesis explains one observation.
 #[derive(Clone, Copy, Debug)]
@@ -165,9 +83,7 @@ impl<const V: usize, const D: usize, const T: usize> Builder<'_, V, D, T> {
         to.extend(&self.record.get(index), index, step.choice, step.gain, from.map.bearing(came_by));
         if step.choice.target == Target::New {
             let vertex = from.map.vertex(came_by);
-            if let Some(slot) = self.translation.vertex.get_mut(usize::from(vertex)) {
-                *slot = to.map.vertex(to.at);
-            }
+            self.translation.set_vertex(vertex, to.map.vertex(to.at));
             self.translation.set(came_by, to.at);
         }
     }
@@ -175,10 +91,13 @@ impl<const V: usize, const D: usize, const T: usize> Builder<'_, V, D, T> {
     /// How `from` explains observation `index`, as a choice of `to`.
     fn translated(&mut self, from: &Hypothesis<V, D, T>, to: &mut Hypothesis<V, D, T>, index: usize) -> Option<Choice> {
         let came_by = from.came_by(index);
-        if came_by == NONE {
+        if came_by == OFF_MAP && !to.has_room(Choice { exit: NONE, target: Target::New }) {
+            return Some(Choice { exit: NONE, target: Target::OffMap });
+        }
+        if came_by >= UNSEEN {
             return None;
         }
-        let exit = if self.record.get(index).starts() || to.at == NONE {
+        let exit = if self.record.get(index).starts() || !to.is_on_map() {
             NONE
         } else {
             let exit = from.map.partner(came_by)?;
@@ -214,7 +133,7 @@ impl<const V: usize, const D: usize, const T: usize> Builder<'_, V, D, T> {
     ) -> Option<(Target, bool)> {
         let entry = self.record.get(index);
         let par = self.model.par(entry.count(), entry.ln_travel > 0);
-        if to.at != NONE
+        if to.is_on_map()
             && !entry.starts()
             && let reported @ ReportedExit::Way(exit) = to.reported_exit(self.record, index, to.at)
             && to.map.partner(exit).is_some()
@@ -265,16 +184,14 @@ impl<const V: usize, const D: usize, const T: usize> Builder<'_, V, D, T> {
         target: Target,
     ) -> bool {
         let came_by = from.came_by(index);
-        if came_by == NONE {
+        if came_by >= UNSEEN || !to.is_on_map() {
             return false;
         }
         let vertex = from.map.vertex(came_by);
         match (self.translation.vertex(vertex), target) {
             (Some(_), _) => self.translation.image(from, to, came_by) == Some(to.at),
             (None, Target::New) => {
-                if let Some(slot) = self.translation.vertex.get_mut(usize::from(vertex)) {
-                    *slot = to.map.vertex(to.at);
-                }
+                self.translation.set_vertex(vertex, to.map.vertex(to.at));
                 to.map.turn_vertex(to.map.vertex(to.at), from.map.bearing(came_by).wrapping_sub(to.map.bearing(to.at)));
                 self.translation.set(came_by, to.at);
                 true
@@ -296,10 +213,10 @@ impl<const V: usize, const D: usize, const T: usize> Builder<'_, V, D, T> {
                 gain
             }
             // From a new vertex the only known way leads back.
-            Target::New if choice.exit != NONE && self.record.get(index + 1).exit().is_some_and(Exit::is_back) => {
+            Target::New if choice.exit < UNSEEN && self.record.get(index + 1).exit().is_some_and(Exit::is_back) => {
                 self.arrive(on, index + 1, choice.exit) + self.follow_known(on, index + 1, choice.exit)
             }
-            Target::New => -OPEN,
+            Target::New | Target::OffMap => -OPEN,
         }
     }
 
@@ -337,6 +254,9 @@ impl<const V: usize, const D: usize, const T: usize> Builder<'_, V, D, T> {
                 - par
         };
         let mut best = (f32::NEG_INFINITY, NONE);
+        if reported == ReportedExit::Unseen {
+            return (-OPEN, NONE);
+        }
         if let ReportedExit::Way(exit) = reported {
             let Some(partner) = on.map.partner(exit) else { return (-OPEN, NONE) };
             best = (gain(partner), partner);
@@ -349,7 +269,7 @@ impl<const V: usize, const D: usize, const T: usize> Builder<'_, V, D, T> {
                 let cost = match reported {
                     ReportedExit::Way(_) => self.model.ln_wrong_exit(others),
                     ReportedExit::NotBack(came_by) if exit == came_by => self.model.ln_wrong_exit(1),
-                    ReportedExit::NotBack(_) | ReportedExit::Unknown => 0.0,
+                    _ => 0.0,
                 };
                 let other = match on.map.partner(exit) {
                     Some(partner) => (cost + gain(partner), partner),

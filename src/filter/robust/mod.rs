@@ -31,7 +31,7 @@ pub(crate) mod model;
 mod noise;
 mod proposals;
 mod publish;
-mod special_functions;
+pub(crate) mod special_functions;
 mod split_proposals;
 pub(crate) mod statistics;
 mod step;

@@ -33,7 +33,7 @@ pub(crate) struct Model {
     /// b = a s²: the scale of the inverse-gamma prior of a vertex's variance, in steps².
     pub(crate) scale: f32,
     /// The terms of the label evidence that are the same for all vertices.
-    label_constant: f32,
+    pub(crate) label_constant: f32,
     /// ln P of a right turn hint, and of a wrong one.
     turn: [f32; 2],
     /// ln P of a right degree, of one that is off by one, and of one that is off by more.

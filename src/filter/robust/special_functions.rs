@@ -1,10 +1,10 @@
 //! ln Γ and its derivative in single precision.
 
 /// ½ ln 2π.
-pub(super) const HALF_LN_2_PI: f32 = 0.918_938_5;
+pub(crate) const HALF_LN_2_PI: f32 = 0.918_938_5;
 
 /// ln Γ(x) for x ≥ 0.25, to 10⁻⁵: Stirling's series, after a shift by 4 for small arguments.
-pub(super) fn ln_gamma(x: f32) -> f32 {
+pub(crate) fn ln_gamma(x: f32) -> f32 {
     let (shifted, shift) =
         if x < 4.0 { (x + 4.0, libm::logf(x * (x + 1.0) * (x + 2.0) * (x + 3.0))) } else { (x, 0.0) };
     let inverse = 1.0 / shifted;

@@ -1,7 +1,7 @@
 //! A hypothesis in a snapshot: its map with its ways, the labels, and the way by which the robot came to each place.
 
 use super::NOWHERE;
-use crate::filter::ordered::{OrderedHypothesis as Hypothesis, OrderedLabel as Label};
+use crate::filter::ordered::{OFF_MAP, OrderedHypothesis as Hypothesis, OrderedLabel as Label};
 use crate::map::darts::DartMap;
 use crate::persist::snapshot::{Reader, SnapshotError, Writer};
 use crate::place::Fingerprint;
@@ -116,7 +116,7 @@ pub(super) fn read_path(bytes: &[u8], darts: u8, path: &mut [u8]) -> Result<(), 
 }
 
 pub(super) fn is_way(way: u8, darts: u8) -> bool {
-    way < darts || way == NOWHERE
+    way < darts || way == NOWHERE || way == OFF_MAP
 }
 
 fn bounded(value: f32, least: f32, most: f32) -> Result<f32, SnapshotError> {

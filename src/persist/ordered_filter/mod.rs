@@ -19,8 +19,11 @@ const NOWHERE: u8 = u8::MAX;
 /// The bounds of the standard deviation of a label in steps.
 const NOISE_STEPS: core::ops::RangeInclusive<f32> = 0.1..=1000.0;
 
-/// Kind, capacities, settings, seed, places, refinements, noise.
-const HEAD_BYTES: usize = 5 + 12 + 8 + 4 + 4 + 4;
+/// Kind, capacities, settings, seed, places, refinements, noise, the first place that was localised only.
+const HEAD_BYTES: usize = 5 + 12 + 8 + 4 + 4 + 4 + 2;
+
+/// While the filter maps.
+const MAPS: u16 = u16::MAX;
 const ENTRY_BYTES: usize = 12;
 
 /// The fixed fields of the section.
@@ -30,6 +33,7 @@ struct Head {
     observed: u32,
     refined: u32,
     noise_steps: f32,
+    localised_from: Option<u16>,
 }
 
 impl<const N: usize, const V: usize, const D: usize, const T: usize> OrderedFilter<N, V, D, T> {
@@ -109,7 +113,10 @@ impl<const N: usize, const V: usize, const D: usize, const T: usize> OrderedFilt
         self.repair = Repair::NONE;
         let head = Head::read::<V, D, T>(&mut from)?;
         let len = usize::from(from.u16()?);
-        if len > T || (head.observed as usize) < len {
+        if len > T
+            || (head.observed as usize) < len
+            || head.localised_from.is_some_and(|first| usize::from(first) > len)
+        {
             return Err(SnapshotError::Contents);
         }
         if kept {
@@ -146,6 +153,7 @@ impl<const N: usize, const V: usize, const D: usize, const T: usize> OrderedFilt
             observed: self.observed,
             refined: self.refined,
             noise_steps: self.model.labels.noise_steps(),
+            localised_from: self.localised_from.map(|first| first as u16),
         }
     }
 
@@ -154,6 +162,7 @@ impl<const N: usize, const V: usize, const D: usize, const T: usize> OrderedFilt
         self.seed = head.seed;
         self.observed = head.observed;
         self.refined = head.refined;
+        self.localised_from = head.localised_from.map(usize::from);
         self.model.configure(&head.config);
         self.model.set_noise(head.noise_steps);
         self.record.clear();
@@ -185,7 +194,8 @@ impl Head {
         writer.u64(self.seed)?;
         writer.u32(self.observed)?;
         writer.u32(self.refined)?;
-        writer.f32(self.noise_steps)
+        writer.f32(self.noise_steps)?;
+        writer.u16(self.localised_from.unwrap_or(MAPS))
     }
 
     fn read<const V: usize, const D: usize, const T: usize>(from: &mut Reader<'_>) -> Result<Self, SnapshotError> {
@@ -203,8 +213,14 @@ impl Head {
             travel_noise_permille: from.u16()?,
         };
         config.check().map_err(|_| SnapshotError::Contents)?;
-        let head =
-            Self { config, seed: from.u64()?, observed: from.u32()?, refined: from.u32()?, noise_steps: from.f32()? };
+        let head = Self {
+            config,
+            seed: from.u64()?,
+            observed: from.u32()?,
+            refined: from.u32()?,
+            noise_steps: from.f32()?,
+            localised_from: Some(from.u16()?).filter(|&first| first != MAPS),
+        };
         if NOISE_STEPS.contains(&head.noise_steps) { Ok(head) } else { Err(SnapshotError::Contents) }
     }
 }

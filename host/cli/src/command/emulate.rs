@@ -14,7 +14,7 @@ use clap::{Args, ValueEnum};
 use toposlam::Filter;
 use toposlam::drive::VelocityCommand;
 use toposlam::persist::Persist;
-use toposlam::reference::{SONARS, ordered, paper, robust};
+use toposlam::reference::{SONARS, ordered, paper, robust, small};
 use toposlam::robot::RobotConfig;
 use toposlam::wire::{Belief, Evidence, FilterSettings, Location, Message, Worst};
 use toposlam_cli::emulator::Emulation;
@@ -41,7 +41,7 @@ pub(crate) struct Arguments {
     /// Stop after this many detected places.
     #[arg(long, default_value_t = 30)]
     pub(super) places: usize,
-    /// The robot: `reference`, or `small` with a ring of eight and 16 KiB of RAM (docs/small-robot.md).
+    /// The robot: that of the reference board, or the small one on a Cortex-M0 with 16 KiB of RAM (docs/small-robot.md).
     #[arg(long, value_enum, default_value_t = RobotArgument::Reference)]
     robot: RobotArgument,
     /// Filter of the firmware; each one has an image of its own.
@@ -65,8 +65,13 @@ pub(crate) struct Arguments {
 /// The robot that is emulated.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 enum RobotArgument {
+    /// The reference robot.
     Reference,
+    /// The small robot with a ring of eight sonars.
     Small,
+    /// The small robot with a ring of sixteen.
+    #[value(name = "small-16")]
+    Small16,
 }
 
 /// Timeout of the firmware's velocity command.
@@ -79,10 +84,13 @@ struct Repetition<'buffer, const V: usize, F: Filter<V>> {
 }
 
 pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
-    if arguments.robot == RobotArgument::Small {
+    if arguments.robot != RobotArgument::Reference {
         ensure!(arguments.faults == 0.0, "faults are emulated with the reference robot only");
-        ensure!(arguments.filter == REFERENCE, "the small robot has one filter");
-        return emulate_small::run(arguments);
+        ensure!(arguments.filter == REFERENCE, "the small robot has the ordered filter only");
+        return match arguments.robot {
+            RobotArgument::Small16 => emulate_small::run::<16>(arguments, &["--features", "ring-of-16"]),
+            _ => emulate_small::run::<{ small::SONARS }>(arguments, &[]),
+        };
     }
     if arguments.faults > 0.0 {
         ensure!(arguments.filter == REFERENCE, "faults are emulated with the filter of the reference robot only");

@@ -1,4 +1,6 @@
 //! `toposlam emulate --robot small`: the small robot on an emulated Cortex-M0, and the same robot on the host beside it.
+//!
+//! Every message of the image must be equal to that of the host: places, map, ways, evidence and velocities.
 
 use std::collections::VecDeque;
 use std::path::PathBuf;
@@ -6,7 +8,7 @@ use std::process::Command;
 use std::time::Duration;
 
 use anyhow::{Context, bail, ensure};
-use toposlam::reference::small::{Filter, HISTORY, HYPOTHESES, ROBOT, SONARS, VERTICES};
+use toposlam::reference::small::{self, DARTS, Filter, HISTORY, HYPOTHESES, VERTICES};
 use toposlam::wire::{Decoder, Message, Progress as Decoded};
 use toposlam_cli::emulator::microbit::Microbit;
 use toposlam_cli::progress::Progress;
@@ -25,15 +27,20 @@ const TICKS: u64 = 128;
 /// The processor's clock in kHz.
 const CLOCK_KHZ: u64 = 16_000;
 
-type SmallExploration<'buffer> = Exploration<'buffer, VERTICES, Filter, SONARS>;
+/// Bytes between stack and robot that must stay unused.
+const STACK_RESERVE_BYTES: u64 = 256;
+/// The RAM of the machine in bytes.
+const RAM_BYTES: u64 = 16 * 1024;
 
-pub(super) fn run(arguments: &Arguments) -> anyhow::Result<()> {
+/// Emulates the robot with a ring of `SONARS` sensors; `features` are those of its image.
+pub(super) fn run<const SONARS: usize>(arguments: &Arguments, features: &[&str]) -> anyhow::Result<()> {
     let elf = match &arguments.elf {
         Some(elf) => elf.clone(),
-        None => build()?,
+        None => build(features)?,
     };
     let (plan, model) = arguments.drive.world_for_ring(SONARS)?;
-    let mut exploration = SmallExploration::with_robot(&plan, model, arguments.drive.seed(), &ROBOT, &mut [])?;
+    let (seed, robot) = (arguments.drive.seed(), small::robot::<SONARS>());
+    let mut exploration = Exploration::<VERTICES, Filter, SONARS>::with_robot(&plan, model, seed, &robot, &mut [])?;
     let timeout = Duration::from_secs(arguments.timeout_s);
     let mut machine = Microbit::<SONARS>::start(&arguments.qemu, &elf, timeout)?;
     let mut lines = Lines::default();
@@ -62,7 +69,9 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     let printed = machine.end()?;
     arguments.drive.summarise(&Summary::of(&plan, &exploration))?;
     print_figures(&printed)?;
-    println!("hypotheses: {HYPOTHESES}\nvertices: {VERTICES}\nhistory: {HISTORY}");
+    println!(
+        "capacities: {SONARS} sonars, {HYPOTHESES} hypotheses, {VERTICES} vertices, {DARTS} darts, {HISTORY} places"
+    );
     println!("all {messages} messages of the firmware and of the simulation are equal bit for bit");
     Ok(())
 }
@@ -87,7 +96,7 @@ impl Lines {
     }
 
     /// The next message of the emulated robot.
-    fn firmware(&mut self, machine: &mut Microbit<SONARS>) -> anyhow::Result<Message> {
+    fn firmware<const SONARS: usize>(&mut self, machine: &mut Microbit<SONARS>) -> anyhow::Result<Message> {
         loop {
             if let Some(message) = self.waiting.pop_front() {
                 return Ok(message);
@@ -113,7 +122,11 @@ fn decoded(decoder: &mut Decoder, bytes: &[u8]) -> anyhow::Result<Vec<Message>> 
 }
 
 /// Prints the figures of the image, ticks as instructions, and as milliseconds if each took one cycle.
+///
+/// # Errors
+/// If the stack may have grown into the robot.
 fn print_figures(printed: &str) -> anyhow::Result<()> {
+    let mut used_bytes = 0;
     for line in printed.lines() {
         let (name, number) = line.split_once(": ").with_context(|| format!("the image printed {line:?}"))?;
         let number: u64 = number.parse().with_context(|| format!("the image printed {line:?}"))?;
@@ -123,19 +136,25 @@ fn print_figures(printed: &str) -> anyhow::Result<()> {
                 println!("{what}_instructions{which}: {instructions}");
                 println!("{what}_ms_at_16_mhz{which}: {}", instructions.div_ceil(CLOCK_KHZ));
             }
-            None => println!("{name}: {number}"),
+            None => {
+                println!("{name}: {number}");
+                used_bytes += if name.ends_with("_bytes") { number } else { 0 };
+            }
         }
     }
+    println!("ram_bytes: {used_bytes}");
+    ensure!(used_bytes > 0 && used_bytes + STACK_RESERVE_BYTES < RAM_BYTES, "the stack may have grown into the robot");
     Ok(())
 }
 
 /// Builds the image from the working directory and returns its path.
-fn build() -> anyhow::Result<PathBuf> {
+fn build(features: &[&str]) -> anyhow::Result<PathBuf> {
     let cargo = std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into());
     let target = std::env::var_os("CARGO_TARGET_DIR").map_or_else(|| PathBuf::from("target"), PathBuf::from);
     let target = std::path::absolute(target)?;
     let status = Command::new(cargo)
         .args(["build", "--release", "--locked"])
+        .args(features)
         .current_dir(WORKSPACE)
         .env("CARGO_TARGET_DIR", target.join("microbit"))
         .status()
