@@ -1,6 +1,6 @@
 """Decoder and client for the serial protocol of a toposlam robot.
 
-The specification is `docs/wire.md`; frame version 2, protocol version 4. The module needs only the standard library, and
+The specification is `docs/wire.md`; frame version 2, protocol version 5. The module needs only the standard library, and
 pyserial for serial ports.
 
     from toposlam_stream import Decoder, MapReplica, open_line
@@ -37,9 +37,9 @@ from typing import Annotated, Any, Callable, Iterable, Iterator, Optional, Union
 
 FRAME_VERSION = 2
 """The first byte of every frame of a robot; in a frame to a robot 128 is added."""
-PROTOCOL_VERSION = 4
+PROTOCOL_VERSION = 5
 """The version of the messages."""
-SCHEMA_HASH = 0x8352_6E81_4B95_713B
+SCHEMA_HASH = 0x8409_EFC8_CE2D_743A
 """The 64-bit FNV-1a hash of the schema in `docs/wire.md`."""
 CHUNK_BYTES = 64
 """The most bytes of a snapshot in one request or reply."""
@@ -49,6 +49,8 @@ _HEADER_BYTES = 3
 _CRC_BYTES = 4
 _RAW_BYTES_MAX = 110
 _VERTICES_MAX = 64
+_WAYS_MAX = 7
+_TURN_MRAD = 6283
 _LATE_WINDOW = 64
 _COUNT_MAX = 0xFFFF_FFFF
 
@@ -56,7 +58,7 @@ _COUNT_MAX = 0xFFFF_FFFF
 # The encoding of values: postcard's format.
 
 
-class _UnknownPayload(Exception):
+class _UnknownPayload(ValueError):
     """The payload is unknown."""
 
 
@@ -274,6 +276,7 @@ class FaultKind(enum.IntEnum):
     COMMAND_FLOOD = 13
     DRIVE_LOST = 14
     LOOP_LATE = 15
+    INVALID_HINT = 16
 
 
 class GoalState(enum.IntEnum):
@@ -421,6 +424,16 @@ class Factors:
         ln_consistency_q16: I32
         ln_size_q16: I32
 
+    @dataclass(frozen=True)
+    class Ordered:
+        """The factors of the ordered filter: labels, and moves with the prior of the map."""
+
+        ln_labels_q16: I32
+        ln_moves_q16: I32
+
+
+AnyFactors = Union[Factors.Robust, Factors.Paper, Factors.Ordered]
+
 
 @dataclass(frozen=True)
 class Evidence:
@@ -429,7 +442,7 @@ class Evidence:
     place_index: U32
     consistency_mm: U16
     """65535 if it is infinite."""
-    factors: Annotated[Union[Factors.Robust, Factors.Paper], _choice(Factors.Robust, Factors.Paper)]
+    factors: Annotated[AnyFactors, _choice(*typing.get_args(AnyFactors))]
     lead_q16: I32
     distinct_hypotheses: U16
 
@@ -614,6 +627,81 @@ class GoalStatus:
     state: Annotated[GoalState, _kind(GoalState)]
 
 
+@dataclass(frozen=True)
+class WayId:
+    """A way by its vertex and its position among the ways of that vertex."""
+
+    vertex: U8
+    way: U8
+
+
+@dataclass(frozen=True)
+class Way:
+    """One way of a vertex."""
+
+    bearing_mrad: U16
+    """Counter-clockwise, 0 to 6282; only differences between the ways of one vertex have a meaning."""
+    leads_to: Annotated[Optional[WayId], _optional(_record(WayId))]
+    """The other end of the edge; None for a frontier, a way that nobody has driven."""
+    travel_frames: Annotated[Optional[int], _optional(_unsigned(16))]
+    """The mean travel time of the edge in ring frames, if it is known."""
+
+    def _remapped(self, remapped: Remapped) -> Way:
+        """The way under the new vertex ids; a frontier if the vertex it leads to was removed."""
+        if self.leads_to is None:
+            return self
+        vertex = remapped.now(self.leads_to.vertex)
+        return self._frontier() if vertex is None else dataclasses.replace(self, leads_to=WayId(vertex, self.leads_to.way))
+
+    def _frontier(self) -> Way:
+        return Way(self.bearing_mrad, None, None)
+
+    def _canonical(self) -> bytes:
+        end = self.leads_to or WayId(255, 255)
+        return struct.pack("<HBBH", self.bearing_mrad, end.vertex, end.way, self.travel_frames or 0)
+
+
+@dataclass(frozen=True)
+class Ways:
+    """The ways of one vertex in counter-clockwise order."""
+
+    vertex: U8
+    ways: Annotated[tuple[Way, ...], _list(_record(Way), _WAYS_MAX)]
+
+    def __post_init__(self) -> None:
+        if not self._is_possible():
+            raise _UnknownPayload(f"no map has these ways: {self}")
+
+    def _is_possible(self) -> bool:
+        if self.vertex >= _VERTICES_MAX:
+            return False
+        before_mrad = 0
+        for place, way in enumerate(self.ways):
+            if not before_mrad <= way.bearing_mrad < _TURN_MRAD or way.travel_frames == 0:
+                return False
+            before_mrad = way.bearing_mrad
+            if way.leads_to is None:
+                if way.travel_frames is not None:
+                    return False
+                continue
+            end, here = way.leads_to, WayId(self.vertex, place)
+            if end.vertex >= _VERTICES_MAX or end.way >= _WAYS_MAX or end == here:
+                return False
+            # A loop joins two ways of this vertex, each to the other.
+            if end.vertex == self.vertex and (end.way >= len(self.ways) or self.ways[end.way].leads_to != here):
+                return False
+        return True
+
+
+@dataclass(frozen=True)
+class Exploration:
+    """How far the map is explored."""
+
+    frontiers: U8
+    complete: Flag
+    """Whether the drive reaches no frontier any more."""
+
+
 Message = Union[
     Hello,
     Place,
@@ -632,6 +720,8 @@ Message = Union[
     Reply,
     Velocity,
     GoalStatus,
+    Ways,
+    Exploration,
 ]
 _MESSAGE = _choice(*typing.get_args(Message))
 
@@ -971,6 +1061,7 @@ class MapReplica:
         self.belief: Optional[Belief] = None
         self.worst: Optional[Worst] = None
         self.goal_status: Optional[GoalStatus] = None
+        self.exploration: Optional[Exploration] = None
         self.place: Optional[Place] = None
         self.ring: Optional[Ring] = None
         self.velocity: Optional[Velocity] = None
@@ -978,6 +1069,7 @@ class MapReplica:
         self._labels: dict[int, tuple[int, int]] = {}
         """Radius and visits of the vertices with a known label."""
         self._neighbours = [0] * _VERTICES_MAX
+        self._ways: dict[int, tuple[Way, ...]] = {}
         self._digest: Optional[int] = None
         """The digest of the robot's map, unless a message was lost since it was received."""
 
@@ -1010,6 +1102,9 @@ class MapReplica:
             self._remap(message)
         elif isinstance(message, GoalStatus):
             self.goal_status = message
+        elif isinstance(message, Ways):
+            self._ways[message.vertex] = message.ways
+            self.vertices = max(self.vertices, message.vertex + 1)
         elif not isinstance(message, (Reply, Request)):
             setattr(self, type(message).__name__.lower(), message)
 
@@ -1018,6 +1113,9 @@ class MapReplica:
         since."""
         rows = filter(None, map(self.row, range(self.vertices)))
         canonical = b"".join(struct.pack("<HIQ", row.radius_mm, row.visits, row.neighbours) for row in rows)
+        if any(self._ways.values()):
+            for ways in map(self.ways, range(self.vertices)):
+                canonical += bytes([len(ways)]) + b"".join(way._canonical() for way in ways)
         return self._digest == zlib.crc32(bytes([self.vertices]) + canonical)
 
     def is_complete(self) -> bool:
@@ -1032,6 +1130,22 @@ class MapReplica:
     def edges(self) -> list[tuple[int, int]]:
         """Every edge once, the smaller vertex first, in ascending order; equal ends are a corridor that returns to its place."""
         return [(a, b) for a in range(self.vertices) for b in _bits(self._neighbours[a]) if a <= b]
+
+    def ways(self, vertex: int) -> tuple[Way, ...]:
+        """The ways of a vertex in counter-clockwise order; none for an unknown vertex, and for a robot that knows edges only."""
+        return self._ways.get(vertex, ())
+
+    def way_edges(self) -> list[tuple[WayId, WayId]]:
+        """Every edge between two ways once, the smaller first: parallel edges and loops each count. An edge of which only one end
+        is known is left out."""
+        ends = {WayId(vertex, place): way.leads_to for vertex in range(self.vertices) for place, way in enumerate(self.ways(vertex))}
+        before = lambda one, other: (one.vertex, one.way) < (other.vertex, other.way)
+        return [(here, end) for here, end in ends.items() if end is not None and before(here, end) and ends.get(end) == here]
+
+    def frontiers(self) -> list[WayId]:
+        """Every frontier, a way that nobody has driven."""
+        ways = ((vertex, place, way) for vertex in range(self.vertices) for place, way in enumerate(self.ways(vertex)))
+        return [WayId(vertex, place) for vertex, place, way in ways if way.leads_to is None]
 
     def _set_label(self, label: Union[Vertex, Row]) -> None:
         if label.vertex < _VERTICES_MAX:
@@ -1056,6 +1170,11 @@ class MapReplica:
         for vertex in range(_VERTICES_MAX):
             self._neighbours[vertex] &= kept if vertex < self.vertices else 0
         self._labels = {vertex: label for vertex, label in self._labels.items() if vertex < self.vertices}
+        self._ways = {vertex: tuple(map(self._kept, ways)) for vertex, ways in self._ways.items() if vertex < self.vertices}
+
+    def _kept(self, way: Way) -> Way:
+        """The way; a frontier if it leads to a vertex that the map does not have."""
+        return way._frontier() if way.leads_to is not None and way.leads_to.vertex >= self.vertices else way
 
     def _remap(self, remapped: Remapped) -> None:
         """Applies new vertex ids. The digest is unknown until the size of the new map follows."""
@@ -1064,6 +1183,7 @@ class MapReplica:
         self.vertices = min(max((now + 1 for now in names[: self.vertices] if now is not None), default=0), _VERTICES_MAX)
         labels, self._labels = self._labels, {}
         neighbours, self._neighbours = self._neighbours, [0] * _VERTICES_MAX
+        ways, self._ways = self._ways, {}
         for before, now in enumerate(names):
             if now is None or now >= _VERTICES_MAX:
                 continue
@@ -1073,6 +1193,8 @@ class MapReplica:
             # Merged vertices keep the first label.
             if before in labels:
                 self._labels.setdefault(now, labels[before])
+            # And the first ways.
+            self._ways.setdefault(now, tuple(way._remapped(remapped) for way in ways.get(before, ())))
         if self.location:
             self.location = _with_vertex(self.location, remapped.now(self.location.vertex))
         if self.goal_status:

@@ -108,10 +108,20 @@ class Formats(unittest.TestCase):
     def test_networkx_reads_graphml_with_numbers_as_numbers(self) -> None:
         graph = networkx.read_graphml(io.BytesIO(export(self.file, "graphml").encode()), node_type=int)
         self.assertFalse(graph.is_directed())
-        self.assertEqual({tuple(sorted(edge)) for edge in graph.edges}, self.edges)
+        self.assertEqual({tuple(sorted(edge)) for edge in graph.edges()}, self.edges)
+        ways = self.map.get("ways")
+        if ways:
+            self.assertEqual(graph.number_of_edges(), len(self.map["way_edges"]))
+            frames = sorted(edge["travel_frames"] or 0 for edge in self.map["way_edges"])
+            self.assertEqual(sorted(data.get("travel_frames", 0) for *_, data in graph.edges(data=True)), frames)
         for vertex in self.map["vertices"]:
+            number = vertex["vertex"]
             expected = {key: vertex[key] for key in ("radius_mm", "visits", "x", "y")}
-            self.assertEqual(graph.nodes[vertex["vertex"]], {**expected, "robot_is_here": vertex["vertex"] == self.here})
+            if ways:
+                frontiers = [str(way["way"]) for way in self.map["frontiers"] if way["vertex"] == number]
+                expected |= {"ways": len(ways[number]), "frontiers": " ".join(frontiers)}
+            found = {"frontiers": "", **graph.nodes[number]} if ways else graph.nodes[number]
+            self.assertEqual(found, {**expected, "robot_is_here": number == self.here})
 
     def test_graphviz_keeps_the_positions_and_the_edges(self) -> None:
         dot = export(self.file, "dot")
@@ -150,12 +160,12 @@ class Formats(unittest.TestCase):
         graph = networkx.Graph(self.edges)
         self.assertTrue(networkx.check_planarity(graph)[0], "the office's map is planar")
         collection = geojson.loads(export(self.file, "geojson"))
-        lines = {}
+        lines = []
         for feature in collection.features:
-            if feature.geometry.type == "LineString":
+            if feature.geometry.type == "LineString" and feature.properties["startid"] < feature.properties["endid"]:
                 ends = frozenset((feature.properties["startid"], feature.properties["endid"]))
-                lines[ends] = shape(feature.geometry)
-        for (one, first), (other, second) in itertools.combinations(lines.items(), 2):
+                lines.append((ends, shape(feature.geometry)))
+        for (one, first), (other, second) in itertools.combinations(lines, 2):
             self.assertTrue(one & other or not first.intersects(second), f"{set(one)} crosses {set(other)}")
 
     def test_a_renderer_draws_the_svg(self) -> None:

@@ -1,4 +1,4 @@
-"""Plots the map of a robot as it grows, where the robot is, what its sonars say and where it steers.
+"""Plots the map of a robot as it grows, with its frontiers, where the robot is, what its sonars say and where it steers.
 
     pip install './python[plot]'
     python python/examples/plot_map.py tcp:127.0.0.1:7070
@@ -10,6 +10,7 @@ The map has no coordinates: springs along its edges arrange the vertices. The ar
 from __future__ import annotations
 
 import argparse
+import cmath
 import math
 import random
 import time
@@ -17,9 +18,11 @@ from pathlib import Path
 
 import matplotlib
 
-from toposlam_stream import DEAD, SILENCE, Decoder, Event, Heard, Line, MapReplica, Remapped, open_line
+from toposlam_stream import DEAD, SILENCE, Decoder, Event, Heard, Line, MapReplica, Remapped, WayId, open_line
 
 SECONDS_A_PICTURE = 0.2
+STUB = 0.35
+"""The length of a frontier, a way that nobody has driven."""
 SILENT_MM = 6000
 """Where a sonar that hears nothing is drawn."""
 
@@ -63,10 +66,11 @@ def draw(figure, replica: MapReplica, arrangement: Arrangement, decoder: Decoder
     figure.clear()
     paper = figure.add_subplot(1, 2, 1)
     points = arrangement.arrange(replica.vertices, replica.edges())
-    for a, b in replica.edges():
-        if a == b:
-            paper.plot(points[a].real, points[a].imag, "o", markersize=26, markerfacecolor="none", color="0.6", zorder=1)
-        paper.plot([points[a].real, points[b].real], [points[a].imag, points[b].imag], color="0.6", zorder=1)
+    draw_edges(paper, replica, points)
+    for frontier in replica.frontiers():
+        point = points[frontier.vertex]
+        end = point + cmath.rect(STUB, direction(replica, points, frontier))
+        paper.plot([point.real, end.real], [point.imag, end.imag], ":", color="tab:orange", linewidth=2, zorder=1)
     for vertex, point in points.items():
         row = replica.row(vertex)
         is_here = replica.location is not None and replica.location.vertex == vertex
@@ -77,9 +81,37 @@ def draw(figure, replica: MapReplica, arrangement: Arrangement, decoder: Decoder
     paper.margins(0.15)
     paper.set_axis_off()
     state = "as the robot has it" if replica.is_converged() else "it may lack things"
-    paper.set_title(f"{replica.vertices} places, {len(replica.edges())} edges: {state}")
+    edges = max(len(replica.edges()), len(replica.way_edges()))
+    frontiers = f", {len(replica.frontiers())} frontiers" if replica.exploration else ""
+    paper.set_title(f"{replica.vertices} places, {edges} edges{frontiers}: {state}")
     draw_surroundings(figure.add_subplot(1, 2, 2, projection="polar"), replica)
     figure.suptitle(f"{decoder.counters.messages} messages, {decoder.counters.lost} lost (red: the robot is here)")
+
+
+def draw_edges(paper, replica: MapReplica, points: dict[int, complex]) -> None:
+    """Draws the edges: parallel ones as arcs beside each other, loops as circles."""
+    pairs = [tuple(sorted((one.vertex, other.vertex))) for one, other in replica.way_edges()]
+    pairs += [pair for pair in replica.edges() if pair not in pairs]
+    for number, (a, b) in enumerate(pairs):
+        parallel = pairs[:number].count((a, b))
+        if a == b:
+            size = 26 + 8 * parallel
+            paper.plot(points[a].real, points[a].imag, "o", markersize=size, markerfacecolor="none", color="0.6", zorder=1)
+            continue
+        arc = f"arc3,rad={0.25 * parallel}"
+        ends = [(points[vertex].real, points[vertex].imag) for vertex in (a, b)]
+        paper.annotate("", ends[0], ends[1], arrowprops={"arrowstyle": "-", "connectionstyle": arc, "color": "0.6"}, zorder=1)
+
+
+def direction(replica: MapReplica, points: dict[int, complex], frontier: WayId) -> float:
+    """The direction of a frontier in the picture: as far from the first drawn edge of its vertex as its bearing is."""
+    ways = replica.ways(frontier.vertex)
+    bearing = ways[frontier.way].bearing_mrad / 1000
+    for way in ways:
+        if way.leads_to and way.leads_to.vertex in points and way.leads_to.vertex != frontier.vertex:
+            along = points[way.leads_to.vertex] - points[frontier.vertex]
+            return cmath.phase(along) + bearing - way.bearing_mrad / 1000
+    return bearing
 
 
 def draw_surroundings(axes, replica: MapReplica) -> None:

@@ -33,6 +33,7 @@ from toposlam_stream import (
     Decoder,
     Edge,
     Encoder,
+    Exploration,
     Heard,
     Hello,
     GoalStatus,
@@ -47,6 +48,9 @@ from toposlam_stream import (
     Request,
     Ring,
     Setting,
+    Way,
+    WayId,
+    Ways,
     json_line,
     open_line,
     to_json,
@@ -70,11 +74,13 @@ def feed_in_pieces(stream: bytes, piece_bytes: int) -> tuple[list[Any], Decoder]
 
 
 def replica_json(replica: MapReplica) -> dict[str, Any]:
-    named = ("hello", "location", "evidence", "health", "belief", "worst", "goal_status")
+    named = ("hello", "location", "evidence", "health", "belief", "worst", "goal_status", "exploration")
     return {
         "vertices": replica.vertices,
         "rows": [plain(replica.row(vertex)) for vertex in range(replica.vertices)],
         "edges": [list(edge) for edge in replica.edges()],
+        "ways": [[plain(way) for way in replica.ways(vertex)] for vertex in range(replica.vertices)],
+        "frontiers": [plain(way) for way in replica.frontiers()],
         "is_converged": replica.is_converged(),
         "is_complete": replica.is_complete(),
         "faults": list(replica.faults.values()),
@@ -161,7 +167,7 @@ class Golden(unittest.TestCase):
         for version in (toposlam_stream.PROTOCOL_VERSION, toposlam_stream.FRAME_VERSION):
             self.assertIn(f"version is {version}", specification)
         self.assertIn(f"{toposlam_stream.SCHEMA_HASH:016X}", specification)
-        for kind, requests, count in (("example", False, 21), ("request", True, 20)):
+        for kind, requests, count in (("example", False, 24), ("request", True, 20)):
             blocks = re.findall(rf"```{kind}\n(.*?)```", specification, re.DOTALL)
             self.assertEqual(len(blocks), count)
             for block in blocks:
@@ -169,6 +175,26 @@ class Golden(unittest.TestCase):
                 (event,) = Decoder(requests).feed(frame)
                 self.assertIn(f"sequence: {event.sequence}\n", block)
                 self.assertEqual(Encoder(event.sequence).encode(event.message), frame)
+
+
+class WaysOfAMap(unittest.TestCase):
+    def test_loops_parallel_edges_and_frontiers_are_distinguished(self) -> None:
+        def way(bearing_mrad: int, end: Optional[tuple[int, int]], travel_frames: Optional[int] = None) -> Way:
+            return Way(bearing_mrad, WayId(*end) if end else None, travel_frames)
+
+        hall = Ways(0, (way(0, (1, 1), 54), way(1500, (1, 0)), way(3000, (0, 3)), way(4000, (0, 2)), way(5000, None)))
+        corner = Ways(1, (way(100, (0, 1)), way(1600, (0, 0), 54)))
+        encoder, decoder, replica = Encoder(), Decoder(), MapReplica()
+        for message in (hall, corner, Exploration(1, False)):
+            for event in decoder.feed(encoder.encode(message)):
+                replica.apply(event)
+        ends = [((one.vertex, one.way), (other.vertex, other.way)) for one, other in replica.way_edges()]
+        self.assertEqual(ends, [((0, 0), (1, 1)), ((0, 1), (1, 0)), ((0, 2), (0, 3))])
+        self.assertEqual(replica.frontiers(), [WayId(0, 4)])
+        self.assertEqual(replica.ways(0)[0].travel_frames, 54)
+        self.assertEqual(replica.exploration, Exploration(1, False))
+        with self.assertRaises(ValueError):
+            Ways(0, (way(5, (0, 0)),))
 
 
 class Robustness(unittest.TestCase):
@@ -193,7 +219,7 @@ class Robustness(unittest.TestCase):
             heard = []
             for _ in range(3000):
                 rest = bytes(draw.choice((0, 1, 2, 127, 128, 255)) for _ in range(draw.randrange(30)))
-                body = bytes([version, 0, 0]) + head + bytes([draw.randrange(18)]) + rest
+                body = bytes([version, 0, 0]) + head + bytes([draw.randrange(20)]) + rest
                 raw = body + zlib.crc32(body).to_bytes(4, "little")
                 frame = b"".join(bytes([len(block) + 1]) + block for block in raw.split(b"\0")) + b"\0"
                 (event,) = Decoder(requests).feed(frame)

@@ -212,6 +212,7 @@ where
         self.reporter.report(&self.mapper, seen.as_ref(), faults, |message| line.send(message));
         let place = seen.as_ref().map(|(place, _)| place);
         let velocity = self.drive.advance(self.mapper.detector(), self.mapper.filter(), place);
+        self.reporter.set_complete(self.drive.is_complete());
         if self.drive.holds_place() {
             self.mapper.hold_place();
         }

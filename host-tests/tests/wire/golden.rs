@@ -163,7 +163,7 @@ fn explore() -> Vec<Vec<u8>> {
     let mut exploration = Exploration::start(&plan, RobotModel::default().with_noise(2.0), 3, &mut buffer).unwrap();
     let (mut encoder, mut frames) = (Encoder::new(0), Vec::new());
     let mut listener = Listener::new();
-    while exploration.places() < 12 || !listener.replica().is_converged() || !listener.replica().is_complete() {
+    while exploration.places() < 24 || !listener.replica().is_converged() || !listener.replica().is_complete() {
         exploration.board().sent.clear();
         let ring = exploration.frame();
         let is_place = exploration.map(&ring).is_some();

@@ -36,7 +36,7 @@ pub struct Client<LINE, HEARD> {
     encoder: Encoder,
     listener: Listener,
     next_id: u16,
-    /// Timeout of a reply, or of the whole map; 1 s by default.
+    /// Timeout of a reply; 1 s by default. The whole map may take five times as long.
     pub timeout: Duration,
     /// Number of times a request is sent before the client fails; 5 by default.
     pub attempts: u32,
@@ -124,7 +124,7 @@ impl<LINE: Read + Write, HEARD: FnMut(&Listener, Event<'_>)> Client<LINE, HEARD>
     pub fn map(&mut self) -> Result<&MapReplica<64>, ClientError> {
         for _ in 0..self.attempts {
             self.order(Command::GetMap)?;
-            let deadline = Instant::now() + self.timeout;
+            let deadline = Instant::now() + 5 * self.timeout;
             while Instant::now() < deadline {
                 self.listen()?;
                 let replica = self.listener.replica();

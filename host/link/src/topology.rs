@@ -51,12 +51,12 @@ pub struct Vertex {
 }
 
 impl TopologicalMap {
-    /// Converts to a graph of `petgraph`, in which node `n` is vertex `n`.
-    pub fn to_petgraph(&self) -> UnGraph<Vertex, ()> {
+    /// Converts to a graph of `petgraph`, in which node `n` is vertex `n`. An edge is that of [`TopologicalMap::all_edges`].
+    pub fn to_petgraph(&self) -> UnGraph<Vertex, Option<WayEdge>> {
         let mut graph = UnGraph::with_capacity(self.vertices.len(), self.edges.len());
         let nodes: Vec<_> = self.vertices.iter().map(|vertex| graph.add_node(*vertex)).collect();
-        for &(a, b) in &self.edges {
-            graph.add_edge(nodes[usize::from(a)], nodes[usize::from(b)], ());
+        for ([a, b], edge) in self.all_edges() {
+            graph.add_edge(nodes[usize::from(a)], nodes[usize::from(b)], edge);
         }
         graph
     }
@@ -117,6 +117,23 @@ impl TopologicalMap {
             let is_mutual = self.way(end)?.leads_to == Some(id);
             is_mutual.then_some(WayEdge { ends: [id, end], travel_frames: way.travel_frames })
         })
+    }
+
+    /// Every edge once, as the two vertices that it joins, with its ways. Edges between ways are followed by those of which
+    /// only the vertices are known, all of them if the map has no ways.
+    pub fn all_edges(&self) -> Vec<([u8; 2], Option<WayEdge>)> {
+        let mut edges: Vec<_> = self.way_edges().map(|edge| (edge.ends.map(|end| end.vertex), Some(edge))).collect();
+        for &(a, b) in &self.edges {
+            if !edges.iter().any(|&(ends, _)| ends == [a, b] || ends == [b, a]) {
+                edges.push(([a, b], None));
+            }
+        }
+        edges
+    }
+
+    /// The positions of the frontiers among the ways of a vertex.
+    pub fn frontiers_of(&self, vertex: u8) -> Vec<u8> {
+        self.frontiers().filter(|way| way.vertex == vertex).map(|way| way.way).collect()
     }
 
     /// Every frontier, a way that nobody has driven.

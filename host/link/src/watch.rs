@@ -95,6 +95,11 @@ impl Watch {
         &self.map
     }
 
+    /// The drawing of the map as of the last arrangement.
+    pub const fn layout(&self) -> &Layout {
+        &self.layout
+    }
+
     /// The position of every vertex of the map.
     pub fn points(&self) -> &[Point] {
         self.layout.points()

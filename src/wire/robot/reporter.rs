@@ -65,7 +65,7 @@ impl<const V: usize> Reporter<V> {
             vertices: 0,
             labels: [(0, 0); V],
             neighbours: [0; V],
-            ways: [SentWays::UNSET; V],
+            ways: [SentWays::NONE; V],
             vertices_before: 0,
             location: None,
             belief: None,

@@ -8,6 +8,7 @@ use toposlam::wire::{Command, MapReplica};
 use toposlam_link::client::Client;
 use toposlam_link::line::{Line, open};
 use toposlam_link::listener::{Event, Listener};
+use toposlam_link::topology::TopologicalMap;
 use toposlam_link::{event_text, setting};
 
 /// Arguments of `toposlam command`.
@@ -119,12 +120,18 @@ fn order(client: &mut Client<Box<dyn Line>, impl FnMut(&Listener, Event<'_>)>, c
 }
 
 pub(super) fn print_map(replica: &MapReplica<64>) {
-    println!("map: {} vertices, {} edges", replica.vertices(), replica.edges().count());
+    let map = TopologicalMap::from(replica);
+    let all_edges = map.all_edges();
+    println!("map: {} vertices, {} edges", replica.vertices(), all_edges.len());
     for row in (0..replica.vertices()).filter_map(|vertex| replica.row(vertex)) {
         println!("  vertex {:2}: radius {:4} mm, {} visits", row.vertex, row.radius_mm, row.visits);
     }
-    let edges: Vec<String> = replica.edges().map(|(a, b)| format!("{a}-{b}")).collect();
-    println!("  edges: {}", edges.join(" "));
+    let edges = all_edges.iter().map(|([a, b], _)| format!("{}-{}", a.min(b), a.max(b)));
+    println!("  edges: {}", edges.collect::<Vec<_>>().join(" "));
+    if !map.ways.is_empty() {
+        let frontiers: Vec<String> = map.frontiers().map(|end| format!("{}.{}", end.vertex, end.way)).collect();
+        println!("  frontiers: {}", frontiers.join(" "));
+    }
     if let Some(location) = replica.location() {
         println!("  at vertex {}", location.vertex);
     }

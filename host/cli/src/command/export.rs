@@ -56,14 +56,13 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     ensure!(!map.vertices.is_empty(), "{}: no map received", arguments.source);
     let mut layout = Layout::new();
     layout.arrange(&map);
-    let points = layout.points();
     let here = listener.replica().location().map(|location| location.vertex);
     let text = match arguments.format {
-        Format::Graphml => export::graphml(&map, points, here),
-        Format::Dot => export::dot(&map, points, here),
-        Format::Geojson => export::geojson(&map, points, here, arguments.edge_m),
-        Format::Json => export::json(&map, points, here),
-        Format::Svg => export::svg(&map, points, here),
+        Format::Graphml => export::graphml(&map, &layout, here),
+        Format::Dot => export::dot(&map, &layout, here),
+        Format::Geojson => export::geojson(&map, &layout, here, arguments.edge_m),
+        Format::Json => export::json(&map, &layout, here),
+        Format::Svg => export::svg(&map, &layout, here),
     };
     match &arguments.output {
         Some(file) => std::fs::write(file, text).with_context(|| format!("writing {}", file.display())),

@@ -283,6 +283,8 @@ fn changes_map(event: Event<'_>) -> bool {
                 | Message::Vertex { .. }
                 | Message::Edge { .. }
                 | Message::Row(_)
+                | Message::Ways(_)
+                | Message::Exploration(_)
                 | Message::Location(_)
                 | Message::Remapped(_)
         )
@@ -290,8 +292,9 @@ fn changes_map(event: Event<'_>) -> bool {
 }
 
 /// A map as JSON: `vertices`, each with `vertex`, `radius_mm` and `visits`; `edges`, each a pair of vertices;
-/// `location`, `null` or the robot's `vertex` and the `place_index` of its last place; and `digest`, the robot's digest
-/// of the map.
+/// `location`, `null` or the robot's `vertex` and the `place_index` of its last place; `digest`, the robot's digest of the map;
+/// and if the robot knows ways `ways`, those of each vertex with the fields of `docs/wire.md`, and `exploration`, its `frontiers`
+/// and whether it is `complete`.
 pub fn map_json(listener: &Listener) -> Value {
     let map = listener.map();
     let vertices: Vec<Value> = (0_u8..)
@@ -302,5 +305,10 @@ pub fn map_json(listener: &Listener) -> Value {
         .replica()
         .location()
         .map(|location| json!({"vertex": location.vertex, "place_index": location.place_index}));
-    json!({"vertices": vertices, "edges": map.edges, "location": location, "digest": map.digest()})
+    let mut object = json!({"vertices": vertices, "edges": map.edges, "location": location, "digest": map.digest()});
+    if !map.ways.is_empty() {
+        object["ways"] = json!(map.ways);
+        object["exploration"] = json!(listener.replica().exploration());
+    }
+    object
 }

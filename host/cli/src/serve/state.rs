@@ -14,6 +14,7 @@
 use serde_json::{Value, json};
 use toposlam::FaultKind;
 
+use toposlam_link::layout::Point;
 use toposlam_link::listener::{Listener, Understanding};
 use toposlam_link::watch::{Connection, Watch};
 use toposlam_link::{event_text, json};
@@ -23,6 +24,11 @@ use toposlam_link::{event_text, json};
 pub struct State {
     /// The line and its connection, the map with its layout, the robot's possible vertices and the evidence for them,
     /// the status of its goal, and its faults.
+    ///
+    /// `edges` are pairs of vertices. `lines` are the drawings of all edges, parallel ones and loops included: the two `vertices`,
+    /// the positions of the two `ways` or `null`, and the points of the `line`; one point for a self-loop of a robot that knows
+    /// edges only. `ways` are those of each vertex with the fields of `docs/wire.md`, `frontiers` those that nobody has driven, each
+    /// with its drawing.
     ///
     /// Distances are in millimetres, `null` if infinite; `x` and `y` are in edge lengths, `y` points up. Values not yet
     /// received are `null`.
@@ -57,6 +63,15 @@ fn map(watch: &Watch) -> Value {
             })
         })
         .collect();
+    let at = |point: &Point| json!([thousandths(point.x), thousandths(point.y)]);
+    let lines = watch.layout().edges().into_iter().map(|edge| {
+        let line: Vec<Value> = edge.points.iter().map(at).collect();
+        json!({"vertices": edge.ends, "ways": edge.ways.map(|ways| ways.map(|end| end.way)), "line": line})
+    });
+    let frontiers =
+        watch.layout().stubs().iter().map(
+            |stub| json!({"vertex": stub.way.vertex, "way": stub.way.way, "line": [at(&stub.from), at(&stub.to)]}),
+        );
     let evidence = replica.evidence();
     json!({
         "line": watch.line(),
@@ -65,6 +80,10 @@ fn map(watch: &Watch) -> Value {
         "hello": replica.hello(),
         "vertices": vertices,
         "edges": map.edges,
+        "lines": lines.collect::<Vec<_>>(),
+        "ways": map.ways,
+        "frontiers": frontiers.collect::<Vec<_>>(),
+        "exploration": replica.exploration(),
         "converged": replica.is_converged(),
         "location": replica.location(),
         "belief": replica.belief(),

@@ -3,39 +3,53 @@
 
 use serde_json::{Value, json};
 
-use crate::layout::Point;
+use crate::layout::{Layout, Point};
 use crate::topology::TopologicalMap;
 
 /// The map as a `FeatureCollection` that Nav2's route server can load.
 ///
 /// Points have `id` and `frame`; lines have `id`, `startid` and `endid`. Every feature has a unique `id`, as Nav2
-/// requires. The `metadata` of a vertex is `radius_m`, `visits`, `robot_is_here` and `has_self_loop`. Self-loops are
-/// not exported as lines. The coordinates are those of the drawing, in metres, with edges about `edge_m` long; they are
-/// not positions in the building.
-pub fn geojson(map: &TopologicalMap, points: &[Point], here: Option<u8>, edge_m: f64) -> String {
-    let position = |vertex: u8| {
-        let point = points.get(usize::from(vertex)).copied().unwrap_or_default();
-        // Rounded to the millimetre.
-        json!([point.x, point.y].map(|unit| (unit * edge_m * 1000.0).round() / 1000.0))
-    };
-    let nodes = (0..).zip(&map.vertices).map(|(vertex, label)| {
-        let properties = json!({
-            "id": vertex,
-            "frame": "map",
-            "metadata": {
-                "radius_m": f64::from(label.radius_mm) / 1000.0,
-                "visits": label.visits,
-                "robot_is_here": here == Some(vertex),
-                "has_self_loop": map.edges.contains(&(vertex, vertex)),
-            },
+/// requires. The `metadata` of a vertex is `radius_m`, `visits`, `robot_is_here` and `has_self_loop`, and if the map has ways
+/// `ways`, their number, and `frontiers`, the positions of those that nobody has driven. The `metadata` of a line is then
+/// `start_way`, `end_way` and, if it is known, `travel_frames`. Self-loops are not exported as lines. The coordinates are those
+/// of the drawing, in metres, with edges about `edge_m` long; they are not positions in the building.
+pub fn geojson(map: &TopologicalMap, layout: &Layout, here: Option<u8>, edge_m: f64) -> String {
+    // Rounded to the millimetre.
+    let position = |point: &Point| json!([point.x, point.y].map(|unit| (unit * edge_m * 1000.0).round() / 1000.0));
+    let nodes = (0..).zip(map.vertices.iter().zip(layout.points())).map(|(vertex, (label, point))| {
+        let mut metadata = json!({
+            "radius_m": f64::from(label.radius_mm) / 1000.0,
+            "visits": label.visits,
+            "robot_is_here": here == Some(vertex),
+            "has_self_loop": map.edges.contains(&(vertex, vertex)),
         });
-        feature("Point", position(vertex), properties)
+        if let Some(ways) = map.ways.get(usize::from(vertex)) {
+            metadata["ways"] = ways.len().into();
+            metadata["frontiers"] = map.frontiers_of(vertex).into();
+        }
+        feature("Point", position(point), json!({"id": vertex, "frame": "map", "metadata": metadata}))
     });
-    let ways = map.edges.iter().filter(|(a, b)| a != b).flat_map(|&(a, b)| [(a, b), (b, a)]);
-    let lines = (map.vertices.len()..).zip(ways).map(|(id, (start, end))| {
-        let properties = json!({"id": id, "startid": start, "endid": end});
-        feature("LineString", json!([position(start), position(end)]), properties)
-    });
+    let mut lines = Vec::new();
+    for (line, (_, edge)) in layout.edges().into_iter().zip(map.all_edges()) {
+        let ([start, end], mut points) = (line.ends, line.points);
+        let mut ways = edge.map(|edge| edge.ends.map(|end| end.way));
+        if start == end {
+            continue;
+        }
+        for (start, end) in [(start, end), (end, start)] {
+            let id = map.vertices.len() + lines.len();
+            let mut properties = json!({"id": id, "startid": start, "endid": end});
+            if let Some([start_way, end_way]) = ways {
+                properties["metadata"] = json!({"start_way": start_way, "end_way": end_way});
+            }
+            if let Some(frames) = edge.and_then(|edge| edge.travel_frames) {
+                properties["metadata"]["travel_frames"] = frames.into();
+            }
+            lines.push(feature("LineString", points.iter().map(position).collect(), properties));
+            points.reverse();
+            ways = ways.map(|[start, end]| [end, start]);
+        }
+    }
     let collection = json!({
         "type": "FeatureCollection",
         "name": "graph",
@@ -58,8 +72,8 @@ mod tests {
 
     #[test]
     fn geojson_has_two_lines_per_edge_and_unique_ids() {
-        let (map, points) = sample::map();
-        let collection: Value = serde_json::from_str(&geojson(&map, &points, Some(3), 5.0)).unwrap();
+        let (map, layout) = sample::map();
+        let collection: Value = serde_json::from_str(&geojson(&map, &layout, Some(3), 5.0)).unwrap();
         let features = collection["features"].as_array().unwrap();
         let of_kind =
             |kind: &str| features.iter().filter(|feature| feature["geometry"]["type"] == kind).collect::<Vec<_>>();
@@ -77,5 +91,23 @@ mod tests {
         let metadata = |vertex: usize| &nodes[vertex]["properties"]["metadata"];
         assert_eq!(*metadata(3), json!({"radius_m": 0.48, "visits": 7, "robot_is_here": true, "has_self_loop": true}));
         assert_eq!(metadata(0)["robot_is_here"], false);
+    }
+
+    #[test]
+    fn parallel_edges_have_lines_of_their_own_with_bends() {
+        let (map, layout) = sample::with_ways();
+        let collection: Value = serde_json::from_str(&geojson(&map, &layout, None, 5.0)).unwrap();
+        let features = collection["features"].as_array().unwrap();
+        let lines: Vec<&Value> =
+            features.iter().filter(|feature| feature["geometry"]["type"] == "LineString").collect();
+        assert_eq!(lines.len(), 4);
+        let metadata = |line: usize| &lines[line]["properties"]["metadata"];
+        assert_eq!(*metadata(0), json!({"start_way": 0, "end_way": 1, "travel_frames": 54}));
+        assert_eq!(*metadata(1), json!({"start_way": 1, "end_way": 0, "travel_frames": 54}));
+        assert_eq!(*metadata(2), json!({"start_way": 1, "end_way": 0}));
+        let points = |line: usize| lines[line]["geometry"]["coordinates"].as_array().unwrap().clone();
+        assert_eq!((points(0).len(), points(2).len()), (2, 3));
+        assert_eq!(points(2)[0], points(3)[2]);
+        assert_eq!(features[0]["properties"]["metadata"]["frontiers"], json!([4]));
     }
 }

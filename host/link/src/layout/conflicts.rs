@@ -1,4 +1,5 @@
-//! Conflicts in a drawing: crossing edges, vertices too close to each other, and vertices on edges of others.
+//! Conflicts in a drawing: crossing edges, vertices too close to each other, vertices on edges of others, and neighbours in the
+//! wrong order.
 
 use super::{Point, geometry, graph::Graph};
 
@@ -8,7 +9,7 @@ pub(super) const VERTEX_CLEARANCE: f64 = 0.35;
 /// Minimum distance of a vertex from an edge that does not end at it.
 pub(super) const EDGE_CLEARANCE: f64 = 0.12;
 
-/// Weight of an overlap relative to a crossing.
+/// Weight of an overlap, or of neighbours in the wrong order, relative to a crossing.
 const HIDING: u32 = 5;
 
 /// Weighted number of conflicts of `vertex` at a point with the rest of the drawing; 0 if there are none.
@@ -20,6 +21,7 @@ pub(super) fn conflicts_of(graph: &Graph, points: &[Point], vertex: usize, at: P
         conflicts += hiding_vertex(point, at);
     }
     let neighbours = graph.neighbours(vertex);
+    conflicts += disorder_of(graph, points, vertex, at);
     for &(a, b) in graph.edges().iter().filter(|&&(a, b)| a != vertex && b != vertex) {
         if conflicts > limit {
             return conflicts;
@@ -44,9 +46,10 @@ pub(super) fn conflicts_of(graph: &Graph, points: &[Point], vertex: usize, at: P
     conflicts
 }
 
-/// Number of edges that the edges of `vertex` at a point cross. Counting stops above `limit`.
+/// Number of edges that the edges of `vertex` at a point cross, and of vertices whose neighbours it puts in the wrong order,
+/// weighted. Counting stops above `limit`.
 pub(super) fn crossings_of(graph: &Graph, points: &[Point], vertex: usize, at: Point, limit: u32) -> u32 {
-    let mut crossings = 0;
+    let mut crossings = disorder_of(graph, points, vertex, at);
     for &(a, b) in graph.edges().iter().filter(|&&(a, b)| a != vertex && b != vertex) {
         for &neighbour in graph.neighbours(vertex).iter().filter(|&&neighbour| neighbour != a && neighbour != b) {
             crossings += u32::from(geometry::cross((at, points[neighbour]), (points[a], points[b])));
@@ -63,6 +66,7 @@ pub(super) fn conflicts(graph: &Graph, points: &[Point]) -> u32 {
     let edges = graph.edges();
     let mut conflicts = crossings(graph, points);
     for (vertex, &point) in points.iter().enumerate() {
+        conflicts += disorder(graph, vertex, |other| points[other]);
         for &other in &points[..vertex] {
             conflicts += hiding_vertex(point, other);
         }
@@ -109,6 +113,25 @@ fn hiding_edge(point: Point, edge: (Point, Point)) -> u32 {
         geometry::may_be_near(point, edge, EDGE_CLEARANCE)
             && geometry::squared_distance(point, edge) < EDGE_CLEARANCE * EDGE_CLEARANCE,
     )
+}
+
+/// The disorder of a vertex at a point, and of its neighbours.
+fn disorder_of(graph: &Graph, points: &[Point], vertex: usize, at: Point) -> u32 {
+    let point = |other: usize| if other == vertex { at } else { points[other] };
+    std::iter::once(&vertex).chain(graph.neighbours(vertex)).map(|&of| disorder(graph, of, point)).sum()
+}
+
+/// Whether the known neighbours of a vertex are not drawn in their counter-clockwise order, weighted.
+fn disorder(graph: &Graph, vertex: usize, point: impl Fn(usize) -> Point) -> u32 {
+    let neighbours = graph.neighbours(vertex);
+    if !graph.is_ordered() || neighbours.len() < 3 {
+        return 0;
+    }
+    let centre = point(vertex);
+    let angles = neighbours.iter().map(|&other| point(other) - centre).filter(|along| along.is_known());
+    let angles: Vec<f64> = angles.map(|along| along.y.atan2(along.x)).collect();
+    let falls = angles.iter().zip(angles.iter().cycle().skip(1)).filter(|(angle, next)| next < angle).count();
+    hiding(falls > 1)
 }
 
 const fn hiding(is_hidden: bool) -> u32 {

@@ -3,7 +3,7 @@
 use toposlam::reference::SNAPSHOT_BYTES;
 use toposlam::wire::Message;
 
-use super::{Layout, conflicts, graph::Graph, triangulation::Triangulation};
+use super::{Layout, conflicts, triangulation::Triangulation};
 use crate::listener::{Event, Listener};
 use toposlam_sim::exploration::Exploration;
 use toposlam_sim::world::{Plan, RobotModel};
@@ -28,16 +28,16 @@ impl Tally {
     fn arrange(&mut self, layout: &mut Layout, listener: &Listener) {
         let map = listener.map();
         let before = layout.points().to_vec();
-        let graph_before = layout.graph.clone();
+        let graph_before = layout.network.graph.clone();
         layout.arrange(&map);
-        let graph = Graph::of(&map);
+        let graph = layout.network.graph.clone();
         if graph == graph_before {
             assert_eq!(before, layout.points(), "nothing has changed");
             return;
         }
         self.updates += 1;
         if graph.vertices() < 3 || Triangulation::of(&graph).is_some() {
-            assert_eq!(conflicts::conflicts(&graph, layout.points()), 0, "{map:?}");
+            assert_eq!(conflicts::conflicts(&graph, &layout.points), 0, "{map:?}");
         } else {
             self.not_planar += 1;
         }

@@ -1,20 +1,41 @@
-//! The part of a map that determines the layout: no labels and no self-loops.
-
-use crate::topology::TopologicalMap;
+//! A simple graph, with or without an order of the neighbours: what determines the layout.
 
 /// A simple graph over the vertices 0, 1, ….
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub(super) struct Graph {
     edges: Vec<(usize, usize)>,
     neighbours: Vec<Vec<usize>>,
+    /// Whether a drawing must show the neighbours of each vertex counter-clockwise in the order of their list.
+    is_ordered: bool,
 }
 
 impl Graph {
     pub(super) fn new(vertices: usize) -> Self {
-        Self { edges: Vec::new(), neighbours: vec![Vec::new(); vertices] }
+        Self { edges: Vec::new(), neighbours: vec![Vec::new(); vertices], is_ordered: false }
     }
 
-    pub(super) fn of(map: &TopologicalMap) -> Self {
+    /// A graph from the neighbours of each vertex in counter-clockwise order. The lists are symmetric and name each neighbour
+    /// once.
+    pub(super) fn ordered(neighbours: Vec<Vec<usize>>) -> Self {
+        let of = |(vertex, neighbours): (usize, &Vec<usize>)| {
+            neighbours.iter().filter(|&&other| vertex < other).map(|&other| (vertex, other)).collect::<Vec<_>>()
+        };
+        let edges = neighbours.iter().enumerate().flat_map(of).collect();
+        Self { edges, neighbours, is_ordered: true }
+    }
+
+    pub(super) const fn is_ordered(&self) -> bool {
+        self.is_ordered
+    }
+
+    /// The same graph without an order of the neighbours.
+    pub(super) fn without_order(self) -> Self {
+        Self { is_ordered: false, ..self }
+    }
+
+    /// The graph of a map without ways.
+    #[cfg(test)]
+    pub(super) fn of(map: &crate::topology::TopologicalMap) -> Self {
         let mut graph = Self::new(map.vertices.len());
         for &(a, b) in &map.edges {
             graph.connect(a.into(), b.into());

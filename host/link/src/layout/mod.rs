@@ -1,6 +1,7 @@
 //! Positions for drawing a map, which itself has no coordinates, stable from one update to the next.
 //!
-//! Edges of a planar graph do not cross, and no vertex lies on another or on an edge of others. A vertex keeps its
+//! Edges of a planar graph do not cross, and no vertex lies on another or on an edge of others. The ways of a vertex, if they are
+//! known, are drawn in their counter-clockwise order; so the drawing of a map of genus 0 has no crossings. A vertex keeps its
 //! position as long as that holds; a new vertex is placed beside its neighbours.
 //!
 //! ```
@@ -24,16 +25,19 @@ mod drawing;
 mod embedding;
 mod geometry;
 mod graph;
+mod network;
 mod placement;
 mod redrawing;
 mod reduction;
+mod rotation;
 mod smoothing;
+mod stubs;
 mod triangulation;
 mod untangling;
 
-use toposlam::wire::{Arrival, Header, Message, Remapped};
+use toposlam::wire::{Arrival, Header, Message, Remapped, WayId};
 
-use self::graph::Graph;
+use self::network::Network;
 use crate::topology::TopologicalMap;
 
 /// A position in the drawing, in units of about one edge length. `y` points up.
@@ -50,8 +54,33 @@ pub struct Point {
 /// Deterministic: the same maps in the same order give the same layout.
 #[derive(Clone, Debug, Default)]
 pub struct Layout {
-    graph: Graph,
+    network: Network,
+    /// The positions of the vertices, then of the bends.
     points: Vec<Point>,
+    vertices: usize,
+    stubs: Vec<Stub>,
+}
+
+/// The drawing of an edge.
+#[derive(Clone, Debug, PartialEq)]
+pub struct EdgeLine {
+    /// The vertices that it joins.
+    pub ends: [u8; 2],
+    /// The ways that it joins, if the map has ways.
+    pub ways: Option<[WayId; 2]>,
+    /// The first vertex, the bends and the second vertex. A self-loop of a map without ways has its vertex alone.
+    pub points: Vec<Point>,
+}
+
+/// The drawing of a frontier, a way that nobody has driven: a short line from its vertex.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Stub {
+    /// The way.
+    pub way: WayId,
+    /// The position of the vertex.
+    pub from: Point,
+    /// The end of the line.
+    pub to: Point,
 }
 
 impl Layout {
@@ -63,30 +92,42 @@ impl Layout {
     /// Gives every vertex of the map a position; existing positions are kept where possible.
     ///
     /// Edges of a planar map do not cross. Any two vertices are at least 0.35 apart, and a vertex is at least 0.12 from
-    /// an edge that does not end at it; on a map that is not planar both hold as far as possible. Self-loops and labels
-    /// have no influence. Cost: negligible if the graph is unchanged.
+    /// an edge that does not end at it; on a map that is not planar both hold as far as possible. Labels, and self-loops of a
+    /// map without ways, have no influence. Cost: negligible if the graph is unchanged.
     pub fn arrange(&mut self, map: &TopologicalMap) {
-        let graph = Graph::of(map);
-        if graph == self.graph && self.points.iter().all(|point| point.is_known()) {
-            return;
+        let before = std::mem::replace(&mut self.network, Network::of(map));
+        let graph = &self.network.graph;
+        let is_same =
+            *graph == before.graph && self.network.bends == before.bends && self.vertices == map.vertices.len();
+        if !is_same || !self.points.iter().all(|point| point.is_known()) {
+            let bends = self.points.split_off(self.vertices.min(self.points.len()));
+            let place = |bend| before.bends.iter().position(|other| other == bend).and_then(|index| bends.get(index));
+            self.vertices = map.vertices.len();
+            self.points.resize(self.vertices, Point::UNKNOWN);
+            self.points.extend(self.network.bends.iter().map(|bend| place(bend).copied().unwrap_or(Point::UNKNOWN)));
+            self.rearrange();
         }
-        self.graph = graph;
-        self.points.resize(self.graph.vertices(), Point::UNKNOWN);
+        self.stubs = stubs::stubs(map, &self.network, &self.points);
+    }
+
+    fn rearrange(&mut self) {
+        let graph = &self.network.graph;
         let before = self.points.clone();
         let is_blank = !before.iter().any(|point| point.is_known());
         if is_blank && before.len() > 2 {
-            self.points = redrawing::redraw(&self.graph, &before);
+            self.points = redrawing::redraw(graph, &before);
             return;
         }
         self.place_new();
-        let left = untangling::untangle(&self.graph, &mut self.points);
+        let graph = &self.network.graph;
+        let left = untangling::untangle(graph, &mut self.points);
         if left == 0 {
             return;
         }
-        let points = redrawing::redraw(&self.graph, &before);
-        let redrawn = conflicts::conflicts(&self.graph, &points);
+        let points = redrawing::redraw(graph, &before);
+        let redrawn = conflicts::conflicts(graph, &points);
         // On a non-planar map a few fewer crossings do not justify a jump of the drawing.
-        let is_worth_it = redrawn == 0 || 2 * redrawn < left || left > conflicts::crossings(&self.graph, &self.points);
+        let is_worth_it = redrawn == 0 || 2 * redrawn < left || left > conflicts::crossings(graph, &self.points);
         if redrawn < left && is_worth_it {
             self.points = points;
         }
@@ -111,7 +152,7 @@ impl Layout {
     /// without a position is at NaN.
     pub fn rename(&mut self, renamed: &Remapped) {
         let mut points = Vec::new();
-        for (before, &point) in (0..=u8::MAX).zip(&self.points) {
+        for (before, &point) in (0..=u8::MAX).zip(self.points()) {
             let Some(now) = renamed.now(before).map(usize::from) else { continue };
             if now >= points.len() {
                 points.resize(now + 1, Point::UNKNOWN);
@@ -120,19 +161,35 @@ impl Layout {
                 points[now] = point;
             }
         }
+        self.vertices = points.len();
         self.points = points;
-        self.graph = Graph::default();
+        self.network = Network::default();
+        self.stubs.clear();
     }
 
     /// The position of every vertex.
     pub fn points(&self) -> &[Point] {
-        &self.points
+        &self.points[..self.vertices]
+    }
+
+    /// The drawing of every edge, in the order of [`TopologicalMap::all_edges`].
+    pub fn edges(&self) -> Vec<EdgeLine> {
+        let line = |path: &network::Path| {
+            let points = path.nodes.iter().map(|&node| self.points[node]).collect();
+            EdgeLine { ends: path.ends, ways: path.ways, points }
+        };
+        self.network.paths.iter().map(line).collect()
+    }
+
+    /// The drawing of every frontier.
+    pub fn stubs(&self) -> &[Stub] {
+        &self.stubs
     }
 
     /// Places the vertices that have no position, in descending order of placed neighbours.
     fn place_new(&mut self) {
         loop {
-            let graph = &self.graph;
+            let graph = &self.network.graph;
             let known = |vertex: usize| {
                 graph.neighbours(vertex).iter().filter(|&&neighbour| self.points[neighbour].is_known()).count()
             };
@@ -145,5 +202,7 @@ impl Layout {
 
 #[cfg(test)]
 mod exploration_tests;
+#[cfg(test)]
+mod ordered_tests;
 #[cfg(test)]
 mod tests;

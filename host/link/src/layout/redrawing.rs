@@ -40,7 +40,7 @@ pub(super) fn redraw(graph: &Graph, before: &[Point]) -> Vec<Point> {
         points
     };
     if before.iter().any(|point| point.is_known()) {
-        lay_over(&mut points, before);
+        lay_over(&mut points, before, graph.is_ordered());
         smooth(graph, &mut points, &all, before, SWEEPS);
         put_back(graph, &mut points, before);
     }
@@ -120,8 +120,8 @@ fn mean_length(graph: &Graph, points: &[Point]) -> f64 {
     if count == 0.0 { 1.0 } else { sum / count }
 }
 
-/// Rotates, mirrors and translates a drawing to the best fit with the previous one.
-fn lay_over(points: &mut [Point], before: &[Point]) {
+/// Rotates and translates a drawing to the best fit with the previous one; mirrors it too if it has no order.
+fn lay_over(points: &mut [Point], before: &[Point], is_ordered: bool) {
     let pairs = || points.iter().zip(before).filter(|(_, before)| before.is_known());
     let (from, to) = (geometry::mean(pairs().map(|pair| *pair.0)), geometry::mean(pairs().map(|pair| *pair.1)));
     let mirror = |point: Point, sign: f64| Point::new(point.x, sign * point.y);
@@ -134,7 +134,7 @@ fn lay_over(points: &mut [Point], before: &[Point]) {
         (sign, Point::new(cosine, sine))
     };
     let (straight, mirrored) = (turn(1.0), turn(-1.0));
-    let (sign, turn) = if mirrored.1.squared() > straight.1.squared() { mirrored } else { straight };
+    let (sign, turn) = if !is_ordered && mirrored.1.squared() > straight.1.squared() { mirrored } else { straight };
     let length = turn.length();
     let turn = if length > 0.0 { turn * (1.0 / length) } else { Point::new(1.0, 0.0) };
     for point in points {

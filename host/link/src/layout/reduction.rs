@@ -39,10 +39,16 @@ impl Reduction {
             }
         }
         let kept: Vec<usize> = (0..is_kept.len()).filter(|&vertex| is_kept[vertex]).collect();
+        let number = |original: &usize| kept.binary_search(original).ok();
+        if graph.is_ordered() {
+            let order = |&original: &usize| neighbours[original].iter().filter_map(number).collect();
+            let graph = Graph::ordered(kept.iter().map(order).collect());
+            return Self { graph, kept, leaves, bends };
+        }
         let mut reduced = Graph::new(kept.len());
         for (vertex, &original) in kept.iter().enumerate() {
             for &other in &neighbours[original] {
-                if let Ok(other) = kept.binary_search(&other) {
+                if let Some(other) = number(&other) {
                     reduced.connect(vertex, other);
                 }
             }

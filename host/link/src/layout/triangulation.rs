@@ -2,7 +2,7 @@
 
 use std::collections::HashMap;
 
-use super::{embedding, graph::Graph};
+use super::{embedding, graph::Graph, rotation};
 
 /// A planar embedding in which all faces, the outer one included, are triangles.
 pub(super) struct Triangulation {
@@ -17,15 +17,20 @@ pub(super) struct Triangulation {
 }
 
 impl Triangulation {
-    /// `None` if the graph is not planar or has fewer than three vertices.
+    /// `None` if the graph is not planar or has fewer than three vertices. The order of the neighbours is kept if there is one.
     ///
     /// The outer face is a triangle of the face with the most edges.
     pub(super) fn of(graph: &Graph) -> Option<Self> {
         if graph.vertices() < 3 {
             return None;
         }
-        let mut graph = biconnected(graph);
-        let mut faces = embedding::faces(&graph)?;
+        let (mut graph, mut faces, cut_off) = if graph.is_ordered() {
+            rotation::biconnected(graph)?
+        } else {
+            let graph = biconnected(graph);
+            let faces = embedding::faces(&graph)?;
+            (graph, faces, Vec::new())
+        };
         faces.sort_by_key(|face| std::cmp::Reverse(face.len()));
         let rim = faces.first()?.clone();
         let mut triangles = Vec::new();
@@ -33,6 +38,7 @@ impl Triangulation {
             cut(&mut graph, face, &mut triangles);
         }
         let outer = *triangles.first()?;
+        triangles.extend(cut_off);
         let sides = |[a, b, c]: [usize; 3]| [((a, b), c), ((b, c), a), ((c, a), b)];
         Some(Self { graph, rim, outer, third: triangles.into_iter().flat_map(sides).collect() })
     }

@@ -202,7 +202,7 @@ impl<FILE: Write> Notes<FILE> {
             return Ok(());
         }
         self.layout.arrange(&map);
-        let scene = Scene { map: &map, points: self.layout.points(), robot };
+        let scene = Scene { map: &map, layout: &self.layout, robot };
         self.topics.message(Topic::Map, time_ns, 0, &scene.update(time_ns))?;
         self.topics.message(Topic::Vertices, time_ns, 0, &scene.vertices(time_ns))?;
         self.topics.message(Topic::Transform, time_ns, 0, &scene.transform(time_ns))?;

@@ -9,7 +9,7 @@ use foxglove::messages::{
 use toposlam::ring::Echo;
 use toposlam::wire::Echoes;
 
-use crate::layout::Point;
+use crate::layout::{Layout, Point};
 use crate::topology::{TopologicalMap, Vertex};
 
 /// Frame of reference of the map's drawing.
@@ -31,13 +31,15 @@ const TEXT_HEIGHT_M: f64 = 0.2;
 const PLACE_BLUE: Color = Color { r: 0.25, g: 0.5, b: 0.85, a: 0.8 };
 const ROBOT_ORANGE: Color = Color { r: 1.0, g: 0.55, b: 0.1, a: 0.9 };
 const EDGE_GREY: Color = Color { r: 0.6, g: 0.6, b: 0.6, a: 1.0 };
+/// Of a way that nobody has driven.
+const FRONTIER_GREEN: Color = Color { r: 0.3, g: 0.8, b: 0.4, a: 1.0 };
 const TEXT_WHITE: Color = Color { r: 1.0, g: 1.0, b: 1.0, a: 1.0 };
 
-/// A map with the positions of its vertices and the robot's vertex.
+/// A map with its drawing and the robot's vertex.
 #[derive(Clone, Copy)]
 pub(super) struct Scene<'map> {
     pub(super) map: &'map TopologicalMap,
-    pub(super) points: &'map [Point],
+    pub(super) layout: &'map Layout,
     pub(super) robot: Option<u8>,
 }
 
@@ -46,10 +48,15 @@ pub(super) fn timestamp(time_ns: u64) -> Timestamp {
     Timestamp::new(seconds, (time_ns % 1_000_000_000) as u32)
 }
 
+/// A point of the drawing in the scene.
+fn position(point: Point) -> Vector3 {
+    Vector3 { x: METRES_PER_EDGE * point.x, y: METRES_PER_EDGE * point.y, z: 0.0 }
+}
+
 impl Scene<'_> {
     fn position(&self, vertex: usize, z: f64) -> Vector3 {
-        let point = self.points.get(vertex).copied().unwrap_or_default();
-        Vector3 { x: METRES_PER_EDGE * point.x, y: METRES_PER_EDGE * point.y, z }
+        let point = self.layout.points().get(vertex).copied().unwrap_or_default();
+        Vector3 { z, ..position(point) }
     }
 
     fn pose(&self, vertex: usize, z: f64) -> Pose {
@@ -96,22 +103,25 @@ impl Scene<'_> {
     }
 
     fn lines(&self) -> Vec<LinePrimitive> {
-        let (loops, edges): (Vec<_>, Vec<_>) = self.map.edges.iter().partition(|(a, b)| a == b);
-        let point = |vertex: u8| {
-            let Vector3 { x, y, z } = self.position(vertex.into(), 0.0);
+        // A self-loop of a map without ways has no line.
+        let edges = self.layout.edges();
+        let loops = edges.iter().filter(|edge| edge.points.len() == 1);
+        let point = |point: Point| {
+            let Vector3 { x, y, z } = position(point);
             Point3 { x, y, z }
         };
-        let line = |kind: line_primitive::Type, points| LinePrimitive {
+        let line = |kind: line_primitive::Type, points, color| LinePrimitive {
             r#type: kind.into(),
             pose: Some(Pose { position: Some(Vector3::default()), orientation: Some(UPRIGHT) }),
             thickness: EDGE_THICKNESS_M,
             points,
-            color: Some(EDGE_GREY),
+            color: Some(color),
             ..Default::default()
         };
-        let straight = edges.iter().flat_map(|&&(a, b)| [point(a), point(b)]).collect();
-        let round = |vertex: u8| {
-            let centre = point(vertex);
+        let segments = edges.iter().flat_map(|edge| edge.points.windows(2).flatten()).map(|&end| point(end)).collect();
+        let stubs = self.layout.stubs().iter().flat_map(|stub| [point(stub.from), point(stub.to)]).collect();
+        let round = |centre: Point| {
+            let centre = point(centre);
             let corner = |corner| {
                 let angle = TAU * f64::from(corner) / f64::from(LOOP_CORNERS);
                 let (sine, cosine) = angle.sin_cos();
@@ -119,10 +129,10 @@ impl Scene<'_> {
             };
             (0..LOOP_CORNERS).map(corner).collect()
         };
-        std::iter::once(line(line_primitive::Type::LineList, straight))
-            .filter(|line| !line.points.is_empty())
-            .chain(loops.iter().map(|&&(vertex, _)| line(line_primitive::Type::LineLoop, round(vertex))))
-            .collect()
+        let lists = [(segments, EDGE_GREY), (stubs, FRONTIER_GREEN)];
+        let lists = lists.map(|(points, color)| line(line_primitive::Type::LineList, points, color));
+        let loops = loops.map(|edge| line(line_primitive::Type::LineLoop, round(edge.points[0]), EDGE_GREY));
+        lists.into_iter().filter(|line| !line.points.is_empty()).chain(loops).collect()
     }
 
     /// Position of each vertex, in order of vertex numbers.
@@ -180,8 +190,9 @@ mod tests {
     fn each_vertex_is_a_disc_of_its_radius_and_the_robots_vertex_is_highlighted() {
         let vertices = [1200, 0].map(|radius_mm| Vertex { radius_mm, visits: 1 }).to_vec();
         let map = TopologicalMap { vertices, edges: vec![(0, 1), (1, 1)], ways: Vec::new() };
-        let points = [Point { x: 0.0, y: 0.0 }, Point { x: 1.0, y: -1.0 }];
-        let scene = Scene { map: &map, points: &points, robot: Some(1) };
+        let mut layout = Layout::new();
+        layout.arrange(&map);
+        let scene = Scene { map: &map, layout: &layout, robot: Some(1) };
         let entity = scene.update(5_000_000_001).entities.remove(0);
         assert_eq!(entity.timestamp, Some(Timestamp::new(5, 1)));
         let sizes: Vec<f64> = entity.cylinders.iter().map(|disc| disc.size.unwrap().x).collect();
@@ -192,8 +203,19 @@ mod tests {
         let corners: Vec<usize> = entity.lines.iter().map(|line| line.points.len()).collect();
         assert_eq!(corners, [2, LOOP_CORNERS as usize]);
         let here = scene.transform(0).translation.unwrap();
-        assert_eq!((here.x, here.y), (METRES_PER_EDGE, -METRES_PER_EDGE));
+        let point = layout.points()[1];
+        assert_eq!((here.x, here.y), (METRES_PER_EDGE * point.x, METRES_PER_EDGE * point.y));
         assert_eq!(scene.vertices(0).poses[1].position, Some(here));
+    }
+
+    #[test]
+    fn parallel_edges_and_loops_have_bends_and_frontiers_are_stubs() {
+        let (map, layout) = crate::export::sample::with_ways();
+        let lines = Scene { map: &map, layout: &layout, robot: None }.lines();
+        // One segment of the straight edge, two of the parallel one and three of the loop; one of the frontier.
+        let corners: Vec<usize> = lines.iter().map(|line| line.points.len()).collect();
+        assert_eq!(corners, [12, 2]);
+        assert_eq!(lines[1].color, Some(FRONTIER_GREEN));
     }
 
     #[test]

@@ -5,6 +5,7 @@ use std::sync::LazyLock;
 
 use foxglove::messages::{LaserScan, Log, SceneUpdate};
 use prost::Message as _;
+use toposlam::Filter;
 use toposlam::reference::SNAPSHOT_BYTES;
 use toposlam::ring::Echo;
 use toposlam::wire::{Echoes, Encoder, MAX_FRAME_BYTES, Message, map_digest};

@@ -20,7 +20,7 @@ const WIDEST: f64 = 0.22;
 const LEAST: f64 = 0.08;
 
 pub(super) fn draw(frame: &mut Frame<'_>, area: Rect, model: &Model) {
-    let block = Block::bordered().title("map: number, radius in mm; @ and yellow: the robot");
+    let block = Block::bordered().title("map: number, radius in mm; @ and yellow: the robot; green: frontiers");
     let inside = block.inner(area);
     let (x_bounds, y_bounds) = bounds(model.watch().points(), inside);
     let canvas = Canvas::default()
@@ -35,14 +35,18 @@ pub(super) fn draw(frame: &mut Frame<'_>, area: Rect, model: &Model) {
 fn paint(context: &mut Context<'_>, model: &Model) {
     let points = model.watch().points();
     let map = model.watch().map();
-    for &(a, b) in &map.edges {
-        let (Some(from), Some(to)) = (points.get(usize::from(a)), points.get(usize::from(b))) else { continue };
+    for edge in model.watch().layout().edges() {
+        let [a, b] = edge.ends;
         let color = if is_worst(model, a, b) { Color::LightRed } else { Color::Gray };
-        if a == b {
-            context.draw(&Circle { x: from.x, y: from.y + 0.3, radius: 0.3, color });
-        } else {
-            context.draw(&Line::new(from.x, from.y, to.x, to.y, color));
+        if let [at] = edge.points[..] {
+            context.draw(&Circle { x: at.x, y: at.y + 0.3, radius: 0.3, color });
         }
+        for ends in edge.points.windows(2) {
+            context.draw(&Line::new(ends[0].x, ends[0].y, ends[1].x, ends[1].y, color));
+        }
+    }
+    for stub in model.watch().layout().stubs() {
+        context.draw(&Line::new(stub.from.x, stub.from.y, stub.to.x, stub.to.y, Color::Green));
     }
     context.layer();
     let widest_mm = map.vertices.iter().map(|vertex| vertex.radius_mm).max().unwrap_or(0).max(1);

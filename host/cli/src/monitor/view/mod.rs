@@ -105,8 +105,12 @@ fn heading(model: &Model) -> Line<'_> {
         (_, true) => Span::styled("as the robot has it", GOOD),
         (_, false) => Span::styled("may lack something", Style::new().fg(Color::Yellow)),
     };
-    let size =
-        format!(" {}, {} ", many(map.vertices.len(), "vertex", "vertices"), many(map.edges.len(), "edge", "edges"));
+    let explored = picture.exploration().map_or_else(String::new, |exploration| {
+        let frontiers = many(exploration.frontiers.into(), "frontier", "frontiers");
+        format!(", {frontiers}{}", if exploration.complete { ", complete" } else { "" })
+    });
+    let (vertices, edges) = (map.vertices.len(), map.all_edges().len());
+    let size = format!(" {}, {}{explored} ", many(vertices, "vertex", "vertices"), many(edges, "edge", "edges"));
     let name = if model.is_read_only() { "standard input" } else { model.watch().line() };
     Line::from(vec![Span::from(format!("{name} ")), connection, Span::from(size), whole])
 }

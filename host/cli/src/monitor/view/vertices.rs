@@ -22,6 +22,7 @@ pub(super) fn draw(frame: &mut Frame<'_>, area: Rect, model: &Model) {
             vertex.visits.to_string(),
             permille_at(model, number).map_or(String::new(), |permille| permille.to_string()),
             neighbours.join(" "),
+            frontiers(model, number),
         ];
         Row::new(cells).style(if is_here { HERE } else { Style::new() })
     });
@@ -31,11 +32,18 @@ pub(super) fn draw(frame: &mut Frame<'_>, area: Rect, model: &Model) {
         Constraint::Length(4),
         Constraint::Length(4),
         Constraint::Min(4),
+        Constraint::Length(4),
     ];
     let table = Table::new(rows, widths)
-        .header(Row::new([" no", "mm", "seen", "‰", "edges to"]).style(FAINT))
+        .header(Row::new([" no", "mm", "seen", "‰", "edges to", "open"]).style(FAINT))
         .block(Block::bordered().title("vertices"));
     frame.render_widget(table, area);
+}
+
+/// The number of frontiers of a vertex, empty if there are none.
+fn frontiers(model: &Model, number: usize) -> String {
+    let count = model.watch().map().frontiers_of(number as u8).len();
+    if count == 0 { String::new() } else { count.to_string() }
 }
 
 /// Probability that the robot is at a vertex, in thousandths, if received.
