@@ -359,6 +359,9 @@ impl<const V: usize, const D: usize, const T: usize> Hypothesis<V, D, T> {
             UNSEEN => self.map.add_way(self.map.vertex(self.at), self.unseen_bearing(entry)).unwrap_or(NONE),
             exit => exit,
         };
+        if choice.exit == UNSEEN && matches!(entry.exit(), Some(Exit::Bearing(_))) {
+            self.map.see(exit, 0);
+        }
         let at = match choice.target {
             Target::Known => self.map.partner(exit).unwrap_or(NONE),
             Target::New => {

@@ -328,6 +328,7 @@ impl<const N: usize, const V: usize, const D: usize, const T: usize> Filter<V> f
         }
         let index = self.record.len();
         self.record.push(Entry::new(&observation));
+        self.extend_repair(index);
         self.refined = 0;
         self.observed = self.observed.wrapping_add(1);
         if self.is_localise_only() {
