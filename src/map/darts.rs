@@ -1,7 +1,7 @@
 //! The edge-ordered map: at each vertex the ways in counter-clockwise order, and which two of them an edge joins.
 //!
 //! One way of one vertex is a *dart*. The partner of a dart is the other end of its edge; a dart without partner is a
-//! *frontier*, a way that nobody has driven.
+//! *frontier*, a way that was not driven.
 
 use super::dart::Darts;
 
@@ -300,7 +300,8 @@ impl<const V: usize, const D: usize> DartMap<V, D> {
 
     /// Takes the ways of a vertex that were never seen for seen at this many visits.
     pub(crate) fn assume_seen(&mut self, vertex: u8, visits: u8) {
-        for dart in self.dart.iter_mut().take(self.darts.into()).filter(|dart| dart.vertex == vertex && dart.seen == 0) {
+        for dart in self.dart.iter_mut().take(self.darts.into()).filter(|dart| dart.vertex == vertex && dart.seen == 0)
+        {
             dart.seen = visits;
         }
     }

@@ -137,8 +137,8 @@ where
 
     /// Starts with an empty map, exploring.
     ///
-    /// `buffer` holds snapshots on their way to the flash or over the line. The `SNAPSHOT_BYTES` of the filter plus 420 bytes
-    /// is room for every hypothesis. With an empty buffer the robot makes no snapshots.
+    /// `buffer` holds snapshots on their way to the flash or over the line. The `SNAPSHOT_BYTES` of the filter are
+    /// room for every hypothesis. With an empty buffer the robot makes no snapshots.
     ///
     /// # Errors
     /// [`ConfigError`] names the first setting that is out of its range; the robot must then be started again.
