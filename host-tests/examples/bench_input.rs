@@ -1,67 +1,75 @@
-//! Prints the recorded input of the bench image: the simulated drive through the office plan with seed 1.
+//! Prints the recorded input of the bench image: a drive of the simulated robot through the office plan with seed 1.
 //!
 //! ```sh
 //! cargo run --release -p toposlam-host-tests --example bench_input -- places > src/bin/bench/places.rs
 //! cargo run --release -p toposlam-host-tests --example bench_input -- hints > src/bin/bench/hints.rs
 //! cargo run --release -p toposlam-host-tests --example bench_input -- frames > src/bin/bench/frames.rs
 //! ```
+//!
+//! The robot has the paper's filter, which knows no ways. So it leaves every place by a random exit, and the recording does not
+//! depend on any inference.
 
-use toposlam::Exit;
-use toposlam::place::Place;
-use toposlam::reference::{self, Detector};
-use toposlam_sim::world::{Plan, RobotModel, Simulation};
+use toposlam::reference::paper;
+use toposlam::ring::RingFrame;
+use toposlam_sim::exploration::Exploration;
+use toposlam_sim::world::{Plan, RobotModel, SONARS};
 
-/// As many as the history of the reference robot holds.
 const PLACES: usize = 400;
 const FRAMES: usize = 200;
 
 fn main() {
     let plan = Plan::built_in("office").expect("it is built in");
-    let simulation = Simulation::new(&plan, RobotModel::default(), 1).expect("the plan has a Voronoi graph");
+    let mut exploration = Exploration::<{ paper::VERTICES }, paper::Filter>::with_robot(
+        &plan,
+        RobotModel::default(),
+        1,
+        &paper::ROBOT,
+        &mut [],
+    )
+    .expect("the plan has a Voronoi graph");
     match std::env::args().nth(1).as_deref() {
         Some("places") => {
-            let radii_mm: Vec<_> = places(simulation).iter().map(|(place, _)| place.fingerprint.radius_mm()).collect();
+            while exploration.places() < PLACES {
+                exploration.advance();
+            }
             println!(
-                "// The radii of {PLACES} places in millimetres, as the place detector found them on the simulated"
+                "// The radii of {PLACES} places in millimetres, as the place detector found them on a drive of the simulated robot"
             );
-            println!(
-                "// drive through the office plan with seed 1. `host-tests/examples/bench_input.rs` made this file."
-            );
+            println!("// through the office plan with seed 1. `host-tests/examples/bench_input.rs` made this file.");
             println!("[");
-            for row in radii_mm.chunks(16) {
-                println!("    {},", row.iter().map(u16::to_string).collect::<Vec<_>>().join(", "));
+            for row in exploration.steps().chunks(16) {
+                let radii: Vec<_> = row.iter().map(|step| step.place.fingerprint.radius_mm().to_string()).collect();
+                println!("    {},", radii.join(", "));
             }
             println!("]");
         }
         Some("hints") => {
+            while exploration.places() < PLACES {
+                exploration.advance();
+            }
             println!(
-                "// What is known of these places besides: how the robot left the place before, b for back, o for on, - for"
+                "// The hints of these places: the bearings of the ways other than the one by which the robot came, the exit from"
             );
             println!(
-                "// unknown, and the degree that the detector told, 0 for unknown. `host-tests/examples/bench_input.rs` made"
+                "// the place before, and the travel time in ring frames. `host-tests/examples/bench_input.rs` made this file."
             );
-            println!("// this file.");
             println!("[");
-            for row in places(simulation).chunks(14) {
-                let hints = row.iter().map(|(place, turn)| {
-                    let turn = match turn {
-                        None => '-',
-                        Some(Exit::Back) => 'b',
-                        Some(_) => 'o',
-                    };
-                    format!("*b\"{turn}{}\"", place.degree.unwrap_or(0))
-                });
-                println!("    {},", hints.collect::<Vec<_>>().join(", "));
+            for step in exploration.steps() {
+                println!("    {},", format!("{:?}", step.told.recorded()).replace("Some([", "Some(&["));
             }
             println!("]");
         }
         Some("frames") => {
             println!(
-                "// The first {FRAMES} ring frames of the simulated drive through the office plan with seed 1, ranges"
+                "// The first {FRAMES} ring frames of a drive of the simulated robot through the office plan with seed 1, ranges"
             );
             println!("// in millimetres, 0 for silence. `host-tests/examples/bench_input.rs` made this file.");
             println!("[");
-            for (frame, _) in simulation.take(FRAMES) {
+            for _ in 0..FRAMES {
+                let frame: RingFrame<SONARS> = exploration.frame();
+                exploration.map(&frame);
+                let velocity = exploration.board().velocity;
+                exploration.drive(velocity);
                 let ranges_mm = frame.echoes.map(|echo| echo.range_mm().unwrap_or(0).to_string());
                 println!("    [{}],", ranges_mm.join(", "));
             }
@@ -72,12 +80,4 @@ fn main() {
             std::process::exit(2);
         }
     }
-}
-
-/// The places of a drive, and what the drive knows of how the robot left the place before each.
-fn places(simulation: Simulation) -> Vec<(Place, Option<Exit>)> {
-    let mut detector = Detector::new();
-    detector.start(reference::PLACE, reference::RING).expect("the reference settings are valid");
-    let places = simulation.filter_map(|(frame, truth)| Some((detector.observe(&frame)?, truth.turn)));
-    places.take(PLACES).collect()
 }

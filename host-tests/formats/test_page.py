@@ -135,7 +135,12 @@ class Page(unittest.TestCase):
         self.assertEqual([int(label.split(" mm")[0]) for label in labels], radii)
         self.assertEqual(self.count("#table tr"), vertices)
         self.assertEqual(self.banners(), set())
-        self.assertIn(f"{vertices} vertices, {edges} edges; the robot is at vertex {here}", self.text("summary"))
+        frontiers = re.search(r"frontiers: (.*)", heard)
+        frontiers = frontiers.group(1).split() if frontiers else []
+        drawn = self.browser.execute_script("return [...document.querySelectorAll('#map .frontier')].map((f) => f.dataset.way)")
+        self.assertEqual(sorted(drawn), sorted(frontiers))
+        explored = r"(, \d+ frontiers?(, exploration complete)?)?"
+        self.assertRegex(self.text("summary"), f"{vertices} vertices, {edges} edges{explored}; the robot is at vertex {here}")
         self.assertTrue(self.browser.find_element(By.ID, "map").accessible_name.startswith(f"The map: {vertices} vertices"))
         self.assertRegex(self.text("belief"), r"this map\d+\.\d %its rivals\d+\.\d %consistency(\d+ mm|infinite)")
         self.assertIn("speed0.0 %", self.text("drive"))

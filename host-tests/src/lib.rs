@@ -25,11 +25,12 @@
 //! Labels and distances are in millimetres. Weights are natural logarithms, so that nothing underflows. Eq. 5 is Bayes'
 //! theorem and has no function of its own.
 //!
-//! [`robust`] is not of the paper: it is the evidence by which this project's own filter weighs hypotheses.
+//! [`robust`] and [`ordered`] are not of the paper: they are the evidence by which the two filters of this project weigh hypotheses.
 #![forbid(unsafe_code)]
 
 pub mod consistency;
 pub mod filter;
 pub mod graph;
 pub mod ngram;
+pub mod ordered;
 pub mod robust;

@@ -193,8 +193,7 @@ impl LocalPlanner {
             DriveState::Recover => self.recover(scan),
             DriveState::Stopped => VelocityCommand::STOP,
         };
-        self.departure.driven_permille =
-            self.departure.driven_permille.saturating_add(velocity.speed_permille.into());
+        self.departure.driven_permille = self.departure.driven_permille.saturating_add(velocity.speed_permille.into());
         velocity
     }
 

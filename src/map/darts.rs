@@ -300,7 +300,8 @@ impl<const V: usize, const D: usize> DartMap<V, D> {
 
     /// Takes the ways of a vertex that were never seen for seen at this many visits.
     pub(crate) fn assume_seen(&mut self, vertex: u8, visits: u8) {
-        for dart in self.dart.iter_mut().take(self.darts.into()).filter(|dart| dart.vertex == vertex && dart.seen == 0) {
+        for dart in self.dart.iter_mut().take(self.darts.into()).filter(|dart| dart.vertex == vertex && dart.seen == 0)
+        {
             dart.seen = visits;
         }
     }

@@ -1,4 +1,4 @@
-//! State that survives a restart: snapshots of the map and the drive, and the flash that stores them.
+//! State that survives a restart: snapshots of the map, and the flash that stores them.
 //!
 //! This module depends on the stages whose state it saves; no stage depends on this module.
 

@@ -20,7 +20,7 @@ const VERTEX_BYTES: usize = 4 + 4 + 8;
 impl<const N: usize, const V: usize, const WORDS: usize> PaperFilter<N, V, WORDS> {
     /// The largest snapshot of this filter alone in bytes: `N` particles of `V` vertices and a full history.
     pub const SNAPSHOT_BYTES: usize =
-        FRAME_BYTES + HEAD_BYTES + 4 + 64 * WORDS + N * (PARTICLE_BYTES + V * VERTEX_BYTES);
+        FRAME_BYTES + HEAD_BYTES + 6 + 64 * WORDS + N * (PARTICLE_BYTES + V * VERTEX_BYTES);
 }
 
 /// The fixed fields of the section.
@@ -50,6 +50,7 @@ impl<const N: usize, const V: usize, const WORDS: usize> Persist for PaperFilter
         };
         head.save::<V, WORDS>(writer)?;
         writer.u32(self.history.pushed())?;
+        writer.u16(self.history.len() as u16)?;
         for fingerprint in self.history.iter() {
             writer.u16(fingerprint.steps())?;
         }
@@ -76,7 +77,10 @@ impl<const N: usize, const V: usize, const WORDS: usize> PaperFilter<N, V, WORDS
     #[inline(never)]
     fn read(&mut self, mut from: Reader<'_>, kept: bool) -> Result<(), SnapshotError> {
         let head = Head::read::<N, V, WORDS>(&mut from)?;
-        let pushed = from.u32()?;
+        let (pushed, places) = (from.u32()?, usize::from(from.u16()?));
+        if places != (pushed as usize).min(History::<WORDS>::CAPACITY) {
+            return Err(SnapshotError::Contents);
+        }
         if kept {
             self.config = head.config;
             self.seed = head.seed;
@@ -85,7 +89,7 @@ impl<const N: usize, const V: usize, const WORDS: usize> PaperFilter<N, V, WORDS
             self.consistency.forget();
             self.faults = FaultCounters::new();
         }
-        for _ in 0..(pushed as usize).min(History::<WORDS>::CAPACITY) {
+        for _ in 0..places {
             let fingerprint = Fingerprint::from_steps(from.u16()?).ok_or(SnapshotError::Contents)?;
             if kept {
                 self.history.push(fingerprint);

@@ -1,7 +1,7 @@
 //! Estimates the rotation of the ring from frame to frame by the bearings of its obstacles: the robot has no odometry.
 
-use crate::bearing::{rotated, turn_mrad};
 use super::Obstacles;
+use crate::bearing::{rotated, turn_mrad};
 use crate::top_k::TopK;
 
 /// Bound of the rotation in one frame, and of the distance between the expected and the measured bearing of an obstacle, in

@@ -13,7 +13,7 @@ pub const VERTICES: usize = 64;
 /// The most darts of a map: three ways for each vertex.
 pub const DARTS: usize = 192;
 /// The most observations in the history.
-pub const HISTORY: usize = 240;
+pub const HISTORY: usize = 272;
 
 /// The filter.
 pub type Filter = OrderedFilter<HYPOTHESES, VERTICES, DARTS, HISTORY>;

@@ -36,4 +36,4 @@ pub type ReferenceRobot<'buffer> = Robot<'buffer, SONARS, VERTICES, Filter>;
 pub const ROBOT: RobotConfig<SONARS, RobustConfig> = RobotConfig::new(RING, FILTER);
 
 #[cfg(feature = "snapshot")]
-const _: () = assert!(Filter::SNAPSHOT_BYTES + 420 <= SNAPSHOT_BYTES, "the buffer has room for every hypothesis");
+const _: () = assert!(Filter::SNAPSHOT_BYTES <= SNAPSHOT_BYTES, "the buffer has room for every hypothesis");

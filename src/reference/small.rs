@@ -15,6 +15,8 @@
 
 use crate::filter::{OrderedConfig, OrderedFilter};
 #[cfg(feature = "wire")]
+use crate::persist::snapshot::SnapshotPolicy;
+#[cfg(feature = "wire")]
 use crate::ring::RingGeometry;
 #[cfg(feature = "wire")]
 use crate::robot::{Robot, RobotConfig};
@@ -39,12 +41,13 @@ pub const FILTER: OrderedConfig = OrderedConfig::DEFAULT;
 #[cfg(feature = "wire")]
 pub type SmallRobot<'buffer, const S: usize = SONARS> = Robot<'buffer, S, VERTICES, Filter>;
 
-/// The settings of the robot with an even ring. A turn of the main loop may take ten seconds, for a processor without a
-/// floating-point unit.
+/// The settings of the robot with an even ring: no snapshots, and turns of the main loop of up to ten seconds, for a processor
+/// without a floating-point unit.
 #[cfg(feature = "wire")]
 #[must_use]
 pub const fn robot<const S: usize>() -> RobotConfig<S, OrderedConfig> {
-    RobotConfig::new(RingGeometry::even(), FILTER).with_turn_bound_ms(10_000)
+    let snapshot = SnapshotPolicy { every_places: 0 };
+    RobotConfig::new(RingGeometry::even(), FILTER).with_snapshot(snapshot).with_turn_bound_ms(10_000)
 }
 
 const _: () = assert!(size_of::<Filter>() <= 10 * 1024, "the budget of the filter");

@@ -137,8 +137,8 @@ where
 
     /// Starts with an empty map, exploring.
     ///
-    /// `buffer` holds snapshots on their way to the flash or over the line. The `SNAPSHOT_BYTES` of the filter plus 420 bytes
-    /// is room for every hypothesis. With an empty buffer the robot makes no snapshots.
+    /// `buffer` holds snapshots on their way to the flash or over the line. The `SNAPSHOT_BYTES` of the filter are
+    /// room for every hypothesis. With an empty buffer the robot makes no snapshots.
     ///
     /// # Errors
     /// [`ConfigError`] names the first setting that is out of its range; the robot must then be started again.
@@ -212,6 +212,7 @@ where
         self.reporter.report(&self.mapper, seen.as_ref(), faults, |message| line.send(message));
         let place = seen.as_ref().map(|(place, _)| place);
         let velocity = self.drive.advance(self.mapper.detector(), self.mapper.filter(), place);
+        self.reporter.set_complete(self.drive.is_complete());
         if self.drive.holds_place() {
             self.mapper.hold_place();
         }

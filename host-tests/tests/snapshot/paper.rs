@@ -11,18 +11,18 @@ use toposlam::{Direction, Filter, Observation, PaperConfig, PaperFilter, RobustF
 const WATCHED: usize = 10;
 const PLACES: usize = 60;
 
-type Paper = PaperFilter<6, 12, 1>;
+pub(super) type Paper = PaperFilter<6, 12, 1>;
 
-const ROOM: usize = Paper::SNAPSHOT_BYTES;
+pub(super) const ROOM: usize = Paper::SNAPSHOT_BYTES;
 
-fn started() -> Box<Paper> {
+pub(super) fn started() -> Box<Paper> {
     let config = PaperConfig::DEFAULT.with_direction(Direction::HistoryToMap).with_particles(6);
     let mut filter = Box::new(Paper::new());
     filter.start(config, 7).unwrap();
     filter
 }
 
-fn saved(filter: &mut Paper, room: usize) -> Result<Vec<u8>, SnapshotError> {
+pub(super) fn saved(filter: &mut Paper, room: usize) -> Result<Vec<u8>, SnapshotError> {
     let mut buffer = vec![0; room];
     let mut writer = Writer::new(&mut buffer)?;
     writer.stage(filter)?;
@@ -31,7 +31,7 @@ fn saved(filter: &mut Paper, room: usize) -> Result<Vec<u8>, SnapshotError> {
     Ok(buffer)
 }
 
-fn walks() -> [Vec<Observation>; 2] {
+pub(super) fn walks() -> [Vec<Observation>; 2] {
     [(floor(), 1), (six_rooms(), 2)].map(|(environment, seed)| {
         let mut robot = Robot::new(&environment, Hints::default(), seed);
         (0..PLACES).map(|_| robot.step()).collect()

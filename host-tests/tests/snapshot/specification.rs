@@ -4,6 +4,7 @@ use super::*;
 use std::collections::HashMap;
 use toposlam::Filter;
 use toposlam::persist::snapshot::SNAPSHOT_VERSION;
+use toposlam::reference;
 
 const SPECIFICATION: &str = include_str!("../../../docs/snapshot.md");
 
@@ -81,7 +82,7 @@ fn check<const N: usize, const V: usize, const T: usize>(drive: &Drive) {
             let snapshot = saved(&mut filter, RobustFilter::<N, V, T>::SNAPSHOT_BYTES).unwrap();
             let bytes = contents(&snapshot);
             let mut interpreter = Interpreter { tables: &tables, bytes: &bytes, values: HashMap::new() };
-            interpreter.read("Filter");
+            interpreter.read("Robust filter");
             assert!(interpreter.bytes.is_empty(), "{} {index}: {} left", drive.name, interpreter.bytes.len());
             let value = |name| interpreter.values[name];
             assert_eq!((value("kind"), value("V"), value("HISTORY")), (1, V as u64, T as u64));
@@ -100,7 +101,65 @@ fn check<const N: usize, const V: usize, const T: usize>(drive: &Drive) {
 }
 
 #[test]
-fn snapshots_match_the_tables() {
+fn snapshots_of_the_ordered_filter_match_the_tables() {
+    type Small = toposlam::OrderedFilter<6, 16, 60, 40>;
+    let tables = tables();
+    let mut filter = ordered::started::<6, 16, 60, 40>();
+    for (index, observation) in ordered::walk(60, 5).into_iter().enumerate() {
+        filter.observe(observation);
+        filter.refine();
+        if index % 3 > 0 {
+            continue;
+        }
+        let bytes = contents(&ordered::saved(&mut filter, Small::SNAPSHOT_BYTES).unwrap());
+        let mut interpreter = Interpreter { tables: &tables, bytes: &bytes, values: HashMap::new() };
+        interpreter.read("Ordered filter");
+        assert!(interpreter.bytes.is_empty(), "{index}: {} left", interpreter.bytes.len());
+        let value = |name| interpreter.values[name];
+        assert_eq!((value("kind"), value("V"), value("D"), value("T")), (3, 16, 60, 40));
+        assert_eq!((value("seed"), value("observed")), (7, u64::from(filter.observed())));
+        assert_eq!(value("places"), filter.path().len() as u64);
+        assert_eq!(value("vertices"), filter.map().vertices().len() as u64);
+        assert_eq!(value("map_probability"), u64::from(filter.map_probability_q16()));
+        assert_eq!(f32::from_bits(value("noise_steps") as u32) * 2.0, filter.noise_mm());
+    }
+}
+
+#[test]
+fn snapshots_of_the_paper_s_filter_match_the_tables() {
+    let tables = tables();
+    let mut filter = paper::started();
+    for observation in paper::walks()[0].iter().copied() {
+        filter.observe(observation);
+        let bytes = contents(&paper::saved(&mut filter, paper::ROOM).unwrap());
+        let mut interpreter = Interpreter { tables: &tables, bytes: &bytes, values: HashMap::new() };
+        interpreter.read("Paper's filter");
+        assert!(interpreter.bytes.is_empty(), "{} left", interpreter.bytes.len());
+        let value = |name| interpreter.values[name];
+        assert_eq!((value("kind"), value("V"), value("HISTORY")), (2, 12, 32));
+        assert_eq!(
+            (value("observed"), value("particles")),
+            (u64::from(filter.observed()), filter.particles().len() as u64)
+        );
+    }
+}
+
+#[test]
+fn a_snapshot_of_another_version_is_refused() {
+    let mut filter = ordered::started::<3, 8, 30, 16>();
+    filter.observe(Fingerprint::from_steps(500).unwrap());
+    let mut snapshot = ordered::saved(&mut filter, 10_000).unwrap();
+    snapshot[4..6].copy_from_slice(&1_u16.to_le_bytes());
+    let end = snapshot.len() - 4;
+    let crc = toposlam::wire::crc32(&snapshot[..end]);
+    snapshot[end..].copy_from_slice(&crc.to_le_bytes());
+    let error = Snapshot::open(&snapshot).unwrap_err();
+    assert_eq!(error, SnapshotError::Version { found: 1 });
+    assert_eq!(error.to_string(), "the snapshot has version 1, not 2");
+}
+
+#[test]
+fn snapshots_of_the_robust_filter_match_the_tables() {
     for drive in drives(60) {
         check::<4, 12, 24>(&drive);
         check::<3, 20, 16>(&drive);
@@ -111,7 +170,9 @@ fn snapshots_match_the_tables() {
 fn the_specification_states_the_version_and_the_largest_snapshot() {
     for sentence in [
         format!("The snapshot version is {SNAPSHOT_VERSION}."),
-        format!("{} bytes for the reference robot", toposlam::reference::robust::Filter::SNAPSHOT_BYTES),
+        format!("{} bytes for the reference robot", reference::ordered::Filter::SNAPSHOT_BYTES),
+        format!("{} bytes with the robust filter", reference::robust::Filter::SNAPSHOT_BYTES),
+        format!("{} bytes with\nthe paper's", reference::paper::Filter::SNAPSHOT_BYTES),
     ] {
         assert!(SPECIFICATION.contains(&sentence), "{sentence}");
     }

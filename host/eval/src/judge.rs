@@ -254,6 +254,7 @@ mod tests {
             walk: WalkKind::Uniform,
             seed: 1,
             filter: Filter::Robust(RobustConfig::DEFAULT),
+            capacities: Default::default(),
             prior,
             refinement_steps: 0,
             prior_refinement_steps: 0,

@@ -23,6 +23,8 @@ pub struct Settings {
     pub seed: u64,
     /// The filter and its parameters.
     pub filter: Filter,
+    /// The capacities of the ordered filter.
+    pub capacities: Capacities,
     /// The prior of the filter.
     pub prior: PriorSource,
     /// Refinement steps of the filter after each place.
@@ -54,6 +56,16 @@ impl Settings {
     pub fn judges_ways(&self) -> bool {
         self.hints.ways && matches!(self.filter, Filter::Ordered(_))
     }
+}
+
+/// The robot whose capacities the ordered filter has.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Capacities {
+    /// The reference robot.
+    #[default]
+    Reference,
+    /// The small robot.
+    Small,
 }
 
 /// The filter to evaluate.

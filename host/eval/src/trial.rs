@@ -226,6 +226,7 @@ mod tests {
             walk: WalkKind::Uniform,
             seed: 5,
             filter: Filter::Robust(RobustConfig::DEFAULT),
+            capacities: Default::default(),
             prior,
             refinement_steps: 0,
             prior_refinement_steps: 0,

@@ -6,6 +6,7 @@
 
 mod clock;
 mod costs;
+mod grid;
 #[path = "../shared/mod.rs"]
 mod shared;
 
@@ -15,14 +16,15 @@ use clock::Clock;
 use cortex_m_semihosting::{debug, hprintln};
 use costs::Costs;
 use defmt_rtt as _;
+use grid::Grid;
 use static_cell::ConstStaticCell;
 use toposlam::{
-    Exit, FaultCounters, Filter as _, Fingerprint, Observation, RobustConfig, RobustFilter, Update,
+    Exit, FaultCounters, Filter as _, Fingerprint, Observation, Update, Ways,
     drive::{Drive, VelocityCommand},
     persist::Persist,
     persist::snapshot::Writer,
     reference::{
-        self, Detector, Filter, HISTORY, ReferenceRobot, RobotMapper, SNAPSHOT_BYTES, SONARS, VERTICES, paper,
+        self, Detector, Filter, HISTORY, ReferenceRobot, RobotMapper, SNAPSHOT_BYTES, SONARS, VERTICES, paper, robust,
     },
     ring::{Echo, RingFrame},
     robot::{Board, SaveError},
@@ -34,14 +36,12 @@ use toposlam::{
 
 /// Radius of each recorded place, in millimetres.
 const PLACES_MM: [u16; 400] = include!("places.rs");
-/// Hints of each place: `b` (back), `o` (on) or `-` (unknown) for the turn at the place before, and the degree.
-const HINTS: [[u8; 2]; PLACES_MM.len()] = include!("hints.rs");
+/// Hints of each place: bearings of the ways other than the one the robot came by, the exit from the place before, and the travel
+/// time in ring frames; 0 if it is unknown. Bearings are in milliradians from the way the robot came by.
+const HINTS: [RecordedHints; PLACES_MM.len()] = include!("hints.rs");
+type RecordedHints = (Option<&'static [u16]>, Option<u16>, u16);
 /// Ranges of each recorded frame, in millimetres; 0 is silence.
 const FRAMES_MM: [[u16; SONARS]; 200] = include!("frames.rs");
-/// A filter with more hypotheses and more vertices than the reference robot's.
-const MORE: usize = 32;
-type LargeFilter = RobustFilter<MORE, MORE, HISTORY>;
-const LARGE_FILTER: RobustConfig = reference::FILTER.with_hypotheses(MORE as u8);
 
 /// The filters share one memory: together they do not fit.
 #[allow(clippy::large_enum_variant)]
@@ -49,8 +49,8 @@ enum Filters {
     /// The whole robot.
     Whole(ReferenceRobot<'static>),
     Robot(Filter),
+    Robust(robust::Filter),
     Paper(paper::Filter),
-    Large(LargeFilter),
 }
 
 type PlaceCosts = Costs<{ PLACES_MM.len() }>;
@@ -59,27 +59,33 @@ type FrameCosts = Costs<{ FRAMES_MM.len() }>;
 
 /// Refinement steps between two places. The robot runs one for each ring frame, some hundreds.
 const SLICES: usize = 10;
+/// The long run repeats the recorded places this often.
+const REPETITIONS: usize = 25;
 
 /// What an observation contains.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Hints {
     /// The radius only.
     Radius,
-    /// Radius and turn.
+    /// Radius and exit.
     Exit,
-    /// Radius, turn and degree.
-    TurnAndDegree,
+    /// Radius, exit and ways.
+    Ways,
+    /// All of these and the travel time.
+    All,
 }
 
-fn observation(radius_mm: u16, [turn, degree]: [u8; 2], hints: Hints) -> Observation {
+fn observation(radius_mm: u16, (others_mrad, exit_mrad, travel_frames): RecordedHints, hints: Hints) -> Observation {
     let Ok(fingerprint) = Fingerprint::from_radius_mm(radius_mm) else { panic!() };
-    let turn = match turn {
-        b'b' if hints != Hints::Radius => Some(Exit::Back),
-        b'o' if hints != Hints::Radius => Some(Exit::On),
-        _ => None,
-    };
-    let degree = Some(degree - b'0').filter(|&degree| degree > 0 && hints == Hints::TurnAndDegree);
-    Observation { turn, degree, ..Observation::new(fingerprint) }
+    let exit = exit_mrad.and_then(|exit_mrad| Exit::from_bearing_mrad(exit_mrad).ok());
+    let ways = others_mrad.and_then(|others_mrad| Ways::from_bearings_mrad(others_mrad).ok());
+    let travel = Some(travel_frames).filter(|&frames| frames > 0);
+    Observation {
+        exit: exit.filter(|_| hints != Hints::Radius),
+        ways: ways.filter(|_| matches!(hints, Hints::Ways | Hints::All)),
+        travel_frames: travel.filter(|_| hints == Hints::All),
+        ..Observation::new(fingerprint)
+    }
 }
 
 /// Runs the recorded places through a filter, and calls `then` after each.
@@ -97,6 +103,45 @@ fn run<const V: usize, F: toposlam::Filter<V>>(
         let (instructions, update) = clock.measure(|| filter.observe(black_box(observation)));
         costs.push(instructions);
         then(filter, &update);
+        for _ in 0..SLICES {
+            let (instructions, ()) = clock.measure(|| filter.refine());
+            refinements.push(instructions);
+        }
+    }
+}
+
+/// Runs the recorded places through the filter again and again, with one refinement step after each place. The robot is carried
+/// back to the first place after each repetition. Prints the costs of each thousand places.
+fn run_long(clock: &Clock, filter: &mut Filter) {
+    let Ok(()) = filter.start(reference::FILTER, reference::SEED) else { panic!() };
+    let (mut sum, mut worst, mut places) = (0, 0, 0);
+    for repetition in 0..REPETITIONS {
+        for (index, (&radius_mm, &recorded)) in PLACES_MM.iter().zip(&HINTS).enumerate() {
+            let starts_sequence = repetition > 0 && index == 0;
+            let observation = Observation { starts_sequence, ..observation(radius_mm, recorded, Hints::All) };
+            let (instructions, _) = clock.measure(|| filter.observe(black_box(observation)));
+            filter.refine();
+            sum += instructions;
+            worst = instructions.max(worst);
+            places += 1;
+            if places % 1000 == 0 {
+                hprintln!("long_{}_instructions_per_place_mean: {}", places, sum / 1000);
+                hprintln!("long_{}_instructions_per_place_worst: {}", places, worst);
+                (sum, worst) = (0, 0);
+            }
+        }
+    }
+    hprintln!("long_vertices: {}", filter.map().vertices().len());
+}
+
+/// Runs a walk through a large building through the filter.
+fn run_large(clock: &Clock, filter: &mut Filter, (costs, refinements): (&mut PlaceCosts, &mut RefinementCosts)) {
+    let Ok(()) = filter.start(reference::FILTER, reference::SEED) else { panic!() };
+    let mut grid = Grid::new();
+    for _ in 0..PLACES_MM.len() {
+        let observation = grid.step();
+        let (instructions, _) = clock.measure(|| filter.observe(black_box(observation)));
+        costs.push(instructions);
         for _ in 0..SLICES {
             let (instructions, ()) = clock.measure(|| filter.refine());
             refinements.push(instructions);
@@ -227,7 +272,7 @@ fn main() -> ! {
     static FILTERS: ConstStaticCell<Filters> = ConstStaticCell::new(Filters::Robot(Filter::new()));
     static DETECTOR: ConstStaticCell<Detector> = ConstStaticCell::new(Detector::new());
     static REPORTER: ConstStaticCell<Reporter<VERTICES>> = ConstStaticCell::new(Reporter::new());
-    static COSTS: ConstStaticCell<[PlaceCosts; 6]> = ConstStaticCell::new([const { PlaceCosts::new() }; 6]);
+    static COSTS: ConstStaticCell<[PlaceCosts; 7]> = ConstStaticCell::new([const { PlaceCosts::new() }; 7]);
     static REFINEMENT_COSTS: ConstStaticCell<RefinementCosts> = ConstStaticCell::new(Costs::new());
     static TURN_COSTS: ConstStaticCell<FrameCosts> = ConstStaticCell::new(Costs::new());
     static SNAPSHOT: ConstStaticCell<[u8; SNAPSHOT_BYTES]> = ConstStaticCell::new([0; SNAPSHOT_BYTES]);
@@ -237,7 +282,7 @@ fn main() -> ! {
     let Some(core) = cortex_m::Peripherals::take() else { panic!() };
     let clock = &Clock::start(core.SYST);
     let (filters, detector_costs) = (FILTERS.take(), DETECTOR_COSTS.take());
-    let [turn_costs, costs, both_costs, large_costs, paper_costs, report_costs] = COSTS.take();
+    let [ordered_costs, large_costs, turn_costs, costs, both_costs, paper_costs, report_costs] = COSTS.take();
     let refinements = REFINEMENT_COSTS.take();
     let mut wire = Wire { reporter: REPORTER.take(), encoder: Encoder::new(0), costs: report_costs, largest_bytes: 0 };
     let capacities = Capacities::new(VERTICES as u8, Filter::capacities(&reference::FILTER), SONARS as u8);
@@ -245,34 +290,42 @@ fn main() -> ! {
 
     let places_detected = detect(clock, DETECTOR.take(), detector_costs);
     if let Filters::Robot(filter) = filters {
-        run(clock, filter, reference::FILTER, Hints::Radius, (costs, refinements), |_, _| {});
-        refinements.print("robust_instructions_per_refinement");
-        run(clock, filter, reference::FILTER, Hints::Exit, (turn_costs, refinements), |_, _| {});
-        refinements.print("robust_turn_instructions_per_refinement");
         let report = |filter: &Filter, update: &Update| wire.report(clock, filter, update);
-        run(clock, filter, reference::FILTER, Hints::TurnAndDegree, (both_costs, refinements), report);
-        refinements.print("robust_both_instructions_per_refinement");
+        run(clock, filter, reference::FILTER, Hints::All, (ordered_costs, refinements), report);
+        refinements.print("ordered_instructions_per_refinement");
         let (instructions, bytes) = save(clock, filter, SNAPSHOT.take());
         hprintln!("snapshot_instructions: {}", instructions);
         hprintln!("snapshot_bytes: {}", bytes);
+        hprintln!("ordered_vertices: {}", filter.map().vertices().len());
+        let stack_bytes = shared::stack_high_water_bytes();
+        hprintln!("ordered_stack_high_water_bytes: {}", stack_bytes);
+        run_large(clock, filter, (large_costs, refinements));
+        refinements.print("large_instructions_per_refinement");
+        hprintln!("large_vertices: {}", filter.map().vertices().len());
+    }
+    *filters = const { Filters::Robust(robust::Filter::new()) };
+    if let Filters::Robust(filter) = filters {
+        run(clock, filter, robust::FILTER, Hints::Radius, (costs, refinements), |_, _| {});
+        refinements.print("robust_instructions_per_refinement");
+        run(clock, filter, robust::FILTER, Hints::Exit, (turn_costs, refinements), |_, _| {});
+        refinements.print("robust_turn_instructions_per_refinement");
+        run(clock, filter, robust::FILTER, Hints::Ways, (both_costs, refinements), |_, _| {});
+        refinements.print("robust_both_instructions_per_refinement");
     }
     *filters = const { Filters::Paper(paper::Filter::new()) };
     if let Filters::Paper(filter) = filters {
         run(clock, filter, paper::FILTER, Hints::Radius, (paper_costs, refinements), |_, _| {});
     }
-    // Measured here, before the larger filter, sorting and formatting use more stack than the robot does.
+    // Measured here, before sorting and formatting use more stack than the robot does.
     let stack_bytes = shared::stack_high_water_bytes();
-    *filters = const { Filters::Large(LargeFilter::new()) };
-    if let Filters::Large(filter) = filters {
-        run(clock, filter, LARGE_FILTER, Hints::Exit, (large_costs, refinements), |_, _| {});
-    }
 
     hprintln!("places: {}", PLACES_MM.len());
     hprintln!("history_places: {}", HISTORY);
+    ordered_costs.print("ordered_instructions_per_place");
+    large_costs.print("large_instructions_per_place");
     turn_costs.print("robust_turn_instructions_per_place");
     costs.print("robust_instructions_per_place");
     both_costs.print("robust_both_instructions_per_place");
-    large_costs.print("robust_32_turn_instructions_per_place");
     paper_costs.print("history_to_map_instructions_per_place");
     wire.costs.print("report_instructions_per_place");
     hprintln!("report_bytes_per_place_worst: {}", wire.largest_bytes);
@@ -284,17 +337,21 @@ fn main() -> ! {
     }
     turn_frames.print("turn_instructions_per_frame");
     hprintln!("robot_bytes: {}", size_of::<ReferenceRobot<'_>>());
-    hprintln!("drive_bytes: {}", size_of::<Drive<VERTICES, HISTORY>>());
+    hprintln!("drive_bytes: {}", size_of::<Drive<VERTICES>>());
     hprintln!("inbox_bytes: {}", size_of::<Inbox>());
     hprintln!("frames: {}", FRAMES_MM.len());
     hprintln!("frames_places_detected: {}", places_detected);
     detector_costs.print("detector_instructions_per_frame");
     hprintln!("ticks_per_million_instructions: {}", clock.ticks_per_million_instructions());
     hprintln!("filter_bytes: {}", size_of::<Filter>());
-    hprintln!("large_filter_bytes: {}", size_of::<LargeFilter>());
+    hprintln!("robust_filter_bytes: {}", size_of::<robust::Filter>());
     hprintln!("paper_filter_bytes: {}", size_of::<paper::Filter>());
     hprintln!("mapper_bytes: {}", size_of::<RobotMapper>());
     hprintln!("stack_high_water_bytes: {}", stack_bytes);
+    *filters = const { Filters::Robot(Filter::new()) };
+    if let Filters::Robot(filter) = filters {
+        run_long(clock, filter);
+    }
     debug::exit(debug::EXIT_SUCCESS);
     loop {
         cortex_m::asm::wfi();

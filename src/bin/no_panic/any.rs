@@ -6,7 +6,7 @@ use core::{
 };
 
 use toposlam::{
-    Exit, Fingerprint, FingerprintError, NgramError, NgramLength, VertexId,
+    Fingerprint, FingerprintError, NgramError, NgramLength, VertexId,
     ring::{Echo, RingFrame},
     wire::{Message, QueueFull},
 };
@@ -62,10 +62,6 @@ pub(crate) fn any_length() -> NgramLength {
 
 pub(crate) fn any_vertex() -> VertexId {
     VertexId::new(black_box(1)).unwrap_or(VertexId::FIRST)
-}
-
-pub(crate) fn any_turn() -> Option<Exit> {
-    [None, Some(Exit::Back), Some(Exit::On)].opaque().first().copied().flatten()
 }
 
 pub(crate) fn any_frame() -> RingFrame<16> {

@@ -12,6 +12,7 @@ use stm32f4xx_hal as _;
 mod any;
 mod map;
 mod mapper;
+mod ordered;
 mod paper;
 mod place;
 mod ring;
@@ -60,6 +61,7 @@ fn main() -> ! {
     paper::ngram();
     paper::history();
     paper::filter();
+    ordered::ordered_filter();
     robust::robust_filter();
     robot::drive();
     mapper::mapper();

@@ -4,39 +4,41 @@ use core::hint::black_box;
 
 use static_cell::ConstStaticCell;
 use toposlam::{
-    ConfigError, FaultCounters, Filter,
+    ConfigError, FaultCounters, Filter, Mapper, OrderedFilter,
     persist::snapshot::{Resume, Snapshot, SnapshotError, SnapshotPolicy, Writer},
     reference,
     wire::{Reporter, map_digest},
 };
 
-use super::any::{Opaque, any_answer, any_frame, any_turn, discard, show};
-use super::robust::robust;
+use super::any::{Opaque, any_answer, any_frame, discard, show};
+use super::ordered::{any_passage, ordered};
 
-const VERTICES: usize = 16;
+/// Two mappers of the reference robot do not fit.
+type SmallMapper = Mapper<16, VERTICES, OrderedFilter<4, VERTICES, 40, 32>>;
+const VERTICES: usize = 12;
 
 pub(crate) fn mapper() {
-    static MAPPER: ConstStaticCell<reference::RobotMapper> = ConstStaticCell::new(reference::RobotMapper::new());
+    static MAPPER: ConstStaticCell<SmallMapper> = ConstStaticCell::new(SmallMapper::new());
     let Some(mapper) = MAPPER.try_take() else { return };
     if let Err(error) = mapper.start(&reference::MAPPER.opaque()) {
         show::<ConfigError>(error);
     }
     for _ in 0..black_box(9) {
-        black_box(mapper.observe(&any_frame(), any_turn()));
+        black_box(mapper.observe(&any_frame(), any_passage()));
     }
-    robust(mapper.filter_mut());
+    ordered(mapper.filter_mut());
     mapper.kidnapped();
     black_box((mapper.faults(), mapper.map(), mapper.filter(), mapper.detector()));
     snapshot(mapper);
     static REPORTER: ConstStaticCell<Reporter<VERTICES>> = ConstStaticCell::new(Reporter::new());
     let Some(reporter) = REPORTER.try_take() else { return };
-    let seen = mapper.observe(&any_frame(), any_turn());
+    let seen = mapper.observe(&any_frame(), any_passage());
     reporter.report(mapper, seen.as_ref(), &FaultCounters::new().opaque(), any_answer);
     reporter.resync(any_answer);
     black_box((reporter.refused(), map_digest(mapper.map(), mapper.filter().darts())));
 }
 
-fn snapshot(mapper: &mut reference::RobotMapper) {
+fn snapshot(mapper: &mut SmallMapper) {
     static BYTES: ConstStaticCell<[u8; 512]> = ConstStaticCell::new([0; 512]);
     let Some(buffer) = BYTES.try_take().and_then(|bytes| bytes.get_mut(..black_box(500))) else { return };
     if let Err(error) = mapper.snapshot(buffer) {

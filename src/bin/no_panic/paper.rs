@@ -6,9 +6,11 @@ use static_cell::ConstStaticCell;
 use toposlam::{
     ConfigError, Consistency, Direction, Filter, Fingerprint, History, Map, Ngram, NgramError, NgramLength, NgramTable,
     NgramsFull, PaperConfig, PaperFilter, Prior,
+    persist::Persist,
+    persist::snapshot::{FILTER_SECTION, Snapshot, Writer},
 };
 
-use super::any::{Opaque, any_fingerprint, any_length, show};
+use super::any::{Opaque, any_fingerprint, any_length, discard, show};
 
 const PARTICLES: usize = 10;
 const VERTICES: usize = 16;
@@ -88,6 +90,14 @@ pub(crate) fn filter() {
         black_box(update.factors.ln_weight_q16());
         black_box(filter.observe_with_prior(any_fingerprint(), prior));
         black_box(prior.extend(filter.history()).is_ok());
+    }
+    let mut buffer = black_box([0; 100]);
+    if let Ok(mut writer) = Writer::new(&mut buffer) {
+        discard(writer.stage(filter));
+        discard(writer.finish());
+    }
+    if let Some(section) = Snapshot::open(&buffer).ok().and_then(|snapshot| snapshot.section(FILTER_SECTION)) {
+        discard(filter.restore(section));
     }
     black_box((filter.best(), filter.particles(), filter.observed(), filter.faults(), filter.config(), filter.map()));
 }

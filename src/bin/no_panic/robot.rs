@@ -9,7 +9,7 @@ use toposlam::drive::{
     DifferentialDrive, Drive, DriveConfig, Goal, MotorError, VelocityCommand, WheelSpeeds, WheelsConfig,
 };
 use toposlam::persist::snapshot::{Resume, SnapshotError};
-use toposlam::reference::{self, HISTORY, ReferenceRobot, SNAPSHOT_BYTES, VERTICES};
+use toposlam::reference::{self, ReferenceRobot, VERTICES};
 use toposlam::robot::{Board, SaveError};
 use toposlam::wire::QueueFull;
 use toposlam::{FaultCounters, VertexId};
@@ -96,19 +96,27 @@ pub(crate) fn drive() {
         }
         Err(error) => show::<toposlam::ConfigError>(error),
     }
-    static DRIVE: ConstStaticCell<Drive<VERTICES, HISTORY>> = ConstStaticCell::new(Drive::new());
+    static DRIVE: ConstStaticCell<Drive<VERTICES>> = ConstStaticCell::new(Drive::new());
     let Some(drive) = DRIVE.try_take() else { return };
     if let Err(error) = drive.start(DriveConfig::DEFAULT.opaque(), black_box(1)).and(drive.set_speed(black_box(3))) {
         show::<toposlam::ConfigError>(error);
     }
     drive.set_goal(Goal::Vertex(VertexId::FIRST).opaque());
     drive.kidnapped();
-    black_box((drive.turn(), drive.goal(), drive.goal_status(), drive.state(), drive.holds_place(), drive.faults()));
+    black_box((
+        drive.passage(),
+        drive.is_complete(),
+        drive.goal(),
+        drive.goal_status(),
+        drive.state(),
+        drive.holds_place(),
+        drive.faults(),
+    ));
 }
 
 pub(crate) fn robot() {
     static ROBOT: ConstStaticCell<ReferenceRobot<'static>> = ConstStaticCell::new(ReferenceRobot::new());
-    static BUFFER: ConstStaticCell<[u8; SNAPSHOT_BYTES]> = ConstStaticCell::new([0; SNAPSHOT_BYTES]);
+    static BUFFER: ConstStaticCell<[u8; 512]> = ConstStaticCell::new([0; 512]);
     let (Some(robot), Some(buffer)) = (ROBOT.try_take(), BUFFER.try_take()) else { return };
     if let Err(error) = robot.start(&reference::ROBOT.opaque(), buffer) {
         show::<toposlam::ConfigError>(error);

@@ -9,7 +9,8 @@ use toposlam::{
     persist::snapshot::{FILTER_SECTION, Snapshot, Writer},
 };
 
-use super::any::{Opaque, any_fingerprint, any_turn, any_vertex, discard, show};
+use super::any::{Opaque, any_fingerprint, any_vertex, discard, show};
+use super::ordered::{any_exit, any_ways};
 
 pub(crate) fn robust_filter() {
     static LARGE: ConstStaticCell<RobustFilter<3, 32, 32>> = ConstStaticCell::new(RobustFilter::new());
@@ -26,8 +27,9 @@ pub(crate) fn robust<const N: usize, const V: usize, const HISTORY: usize>(filte
         black_box(filter.observe(any_fingerprint()));
         let observation = Observation {
             fingerprint: any_fingerprint(),
-            turn: any_turn(),
-            degree: black_box(Some(3)),
+            exit: any_exit(),
+            ways: any_ways(),
+            travel_frames: black_box(Some(100)),
             starts_sequence: false,
         };
         black_box(filter.observe(observation.opaque()));

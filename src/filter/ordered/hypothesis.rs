@@ -306,10 +306,12 @@ impl<const V: usize, const D: usize, const T: usize> Hypothesis<V, D, T> {
         gain.rest += match target {
             Target::Known => model.travel(self.map.travel(exit), entry.ln_travel),
             Target::New | Target::OffMap => model.travel((0, 0), entry.ln_travel),
-            Target::At(dart) => model.travel((0, 0), entry.ln_travel) + {
-                let vertex = self.map.vertex(dart);
-                model.closure(closures.frontiers.into(), closures.keep_genus(exit, dart, vertex))
-            },
+            Target::At(dart) => {
+                model.travel((0, 0), entry.ln_travel) + {
+                    let vertex = self.map.vertex(dart);
+                    model.closure(closures.frontiers.into(), closures.keep_genus(exit, dart, vertex))
+                }
+            }
         };
         gain
     }
@@ -357,6 +359,9 @@ impl<const V: usize, const D: usize, const T: usize> Hypothesis<V, D, T> {
             UNSEEN => self.map.add_way(self.map.vertex(self.at), self.unseen_bearing(entry)).unwrap_or(NONE),
             exit => exit,
         };
+        if choice.exit == UNSEEN && matches!(entry.exit(), Some(Exit::Bearing(_))) {
+            self.map.see(exit, 0);
+        }
         let at = match choice.target {
             Target::Known => self.map.partner(exit).unwrap_or(NONE),
             Target::New => {
@@ -391,7 +396,8 @@ impl<const V: usize, const D: usize, const T: usize> Hypothesis<V, D, T> {
         if let Some(Exit::Bearing(bearing)) = entry.exit() {
             return self.map.bearing(self.at).wrapping_add(u16::from(bearing) << 8);
         }
-        let gap = |way: u8| self.map.bearing(self.map.next_way(way)).wrapping_sub(self.map.bearing(way)).wrapping_sub(1);
+        let gap =
+            |way: u8| self.map.bearing(self.map.next_way(way)).wrapping_sub(self.map.bearing(way)).wrapping_sub(1);
         let ways = self.map.ways(self.map.vertex(self.at));
         let before = ways.iter().copied().max_by_key(|&way| gap(way)).unwrap_or(self.at);
         self.map.bearing(before).wrapping_add(gap(before) / 2)

@@ -1,10 +1,10 @@
 //! Localisation on a map that does not change, and the start with a known map.
 
-use super::{OrderedConfig, OrderedFilter};
 use super::hypothesis::{Choice, Gain, Hypothesis, LN_OFF_MAP, OFF_MAP, Target};
 use super::label::Label;
 use super::model::Model;
 use super::record::Record;
+use super::{OrderedConfig, OrderedFilter};
 use crate::config_error::ConfigError;
 use crate::filter::Filter;
 use crate::map::Map;

@@ -261,7 +261,6 @@ impl<const N: usize, const V: usize, const D: usize, const T: usize> OrderedFilt
         self.publish();
         Some(self.draft.score())
     }
-
 }
 
 /// Vertices keep their ids from update to update as long as most of their visits stay together.
@@ -329,6 +328,7 @@ impl<const N: usize, const V: usize, const D: usize, const T: usize> Filter<V> f
         }
         let index = self.record.len();
         self.record.push(Entry::new(&observation));
+        self.extend_repair(index);
         self.refined = 0;
         self.observed = self.observed.wrapping_add(1);
         if self.is_localise_only() {

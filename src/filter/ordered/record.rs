@@ -131,7 +131,7 @@ impl<const T: usize> Record<T> {
 
     /// Drops the oldest `count` observations.
     pub(super) fn drop_oldest(&mut self, count: usize) {
-        let count = count.min(self.len);
+        let count = count.min(self.len).min(T);
         self.entries.copy_within(count.., 0);
         self.len -= count;
     }

@@ -7,7 +7,7 @@
 
 use super::OrderedFilter;
 use super::fold::{fit, fold};
-use super::hypothesis::{ReportedExit, UNSEEN};
+use super::hypothesis::{Hypothesis, ReportedExit, UNSEEN};
 use super::logarithm::ln;
 use super::replay::Builder;
 use crate::filter::draws;
@@ -40,6 +40,11 @@ const DOUBTED: usize = 6;
 /// Of 16 repairs that forbid a decision so many decide all that follows again.
 const FREE: usize = 6;
 
+/// A repair starts from the draft of the one before if that lost no more than this compared with the best hypothesis, in nats, so
+/// many times in sequence.
+const CHAIN_LOSS: f32 = 25.0;
+const CHAIN_LENGTH: u8 = 2;
+
 /// The noise of decisions is drawn up to this, in nats.
 const TEMPERATURE: f32 = 3.0;
 
@@ -69,10 +74,12 @@ pub(crate) struct Repair {
     follows: bool,
     /// Noise of the decisions.
     temperature: f32,
+    /// How many repairs in sequence started from a draft that is no hypothesis.
+    chained: u8,
 }
 
 impl Repair {
-    pub(crate) const NONE: Self = Self { next: None, stray: Stray::Never, follows: false, temperature: 0.0 };
+    pub(crate) const NONE: Self = Self { next: None, stray: Stray::Never, follows: false, temperature: 0.0, chained: 0 };
 }
 
 impl<const N: usize, const V: usize, const D: usize, const T: usize> OrderedFilter<N, V, D, T> {
@@ -88,21 +95,31 @@ impl<const N: usize, const V: usize, const D: usize, const T: usize> OrderedFilt
         self.refined += 1;
         let mut random = draws(self.seed, piece);
         if self.repair.next.is_none() && !self.start_repair(&mut random) {
+            self.repair_nothing();
             return;
         }
         if self.continue_repair(&mut random) {
             self.repair.next = None;
             if self.draft.score() > self.beam.threshold() {
                 self.beam.insert(&self.draft);
+                self.repair.chained = 0;
+            } else {
+                // A change that loses little may be the first of two that gain.
+                let best = self.beam.get(0).map_or(0.0, Hypothesis::score);
+                let goes_on = self.draft.score() > best - CHAIN_LOSS && self.repair.chained < CHAIN_LENGTH;
+                self.repair.chained = if goes_on { self.repair.chained + 1 } else { 0 };
             }
         }
     }
 
     /// Chooses a source and where to leave its path; tells whether there is something to repair.
     fn start_repair(&mut self, random: &mut Xoshiro128PlusPlus) -> bool {
-        let rank = if below(random, 16) < BEST { 0 } else { below(random, self.beam.len()) };
-        let Some(source) = self.beam.get(rank) else { return false };
-        self.source.clone_from(source);
+        let rank = match self.repair.chained {
+            0 if below(random, 16) < BEST => Some(0),
+            0 => Some(below(random, self.beam.len())),
+            _ => None,
+        };
+        self.take_source(rank);
         let stray = if below(random, 16) < FOLDED {
             if !self.fold_two(random, rank) {
                 return false;
@@ -128,9 +145,16 @@ impl<const N: usize, const V: usize, const D: usize, const T: usize> OrderedFilt
             Stray::From(1 + below(random, self.record.len() - 1))
         };
         let temperature = if stray == Stray::Never { 0.0 } else { TEMPERATURE * uniform(random) };
-        self.repair = Repair { next: Some(0), stray, follows: true, temperature };
+        self.repair = Repair { next: Some(0), stray, follows: true, temperature, chained: self.repair.chained };
         self.start_draft();
         true
+    }
+
+    /// Takes the hypothesis of a rank for the source, or the draft.
+    fn take_source(&mut self, rank: Option<usize>) {
+        if let Some(source) = rank.map_or(Some(&self.draft), |rank| self.beam.get(rank)) {
+            self.source.clone_from(source);
+        }
     }
 
     /// Draws a passage at which the source contradicts the reported exit, and returns the first passage of the edge that was
@@ -194,7 +218,7 @@ impl<const N: usize, const V: usize, const D: usize, const T: usize> OrderedFilt
             let noise = || temperature * gumbel(random);
             let Some((target, followed)) = builder.decide(&mut self.draft, index, forbidden, noise) else {
                 // Nothing else explains the place, or there is no room for what does.
-                self.repair.next = None;
+                self.repair = Repair::NONE;
                 return false;
             };
             work += if followed { 1 } else { DECISION };
@@ -203,6 +227,16 @@ impl<const N: usize, const V: usize, const D: usize, const T: usize> OrderedFilt
         }
         self.repair.next = Some(index);
         index == self.record.len()
+    }
+
+    /// Leaves observation `index` of the source open: the repair under way started before it.
+    pub(super) fn extend_repair(&mut self, index: usize) {
+        if self.repair.next.is_none() {
+            self.repair_nothing();
+        }
+        if let Some(slot) = self.source.path.get_mut(index) {
+            *slot = NONE;
+        }
     }
 
     /// Gives up the repair that is under way.
@@ -240,10 +274,10 @@ impl<const N: usize, const V: usize, const D: usize, const T: usize> OrderedFilt
         (from..until).try_for_each(|index| builder.follow(&self.source, &mut self.draft, index))
     }
 
-    /// Folds two vertices of the source, the hypothesis of a rank; tells whether there were two that fit.
+    /// Folds two vertices of the source, the hypothesis of a rank or the draft; tells whether there were two that fit.
     ///
     /// Pairs are drawn by how well they fit, then one of them by what follows from it.
-    fn fold_two(&mut self, random: &mut Xoshiro128PlusPlus, rank: usize) -> bool {
+    fn fold_two(&mut self, random: &mut Xoshiro128PlusPlus, rank: Option<usize>) -> bool {
         let mut drawn = [(f32::NEG_INFINITY, NONE, NONE); FOLDS];
         let source = &self.source;
         for u in 1..source.map.vertices() {
@@ -274,9 +308,7 @@ impl<const N: usize, const V: usize, const D: usize, const T: usize> OrderedFilt
                     chosen = (score, a, b);
                 }
             }
-            if let Some(source) = self.beam.get(rank) {
-                self.source.clone_from(source);
-            }
+            self.take_source(rank);
         }
         let (_, a, b) = chosen;
         a != NONE && fold(&self.model, &mut self.source, &mut self.union, (a, b), len).is_some()

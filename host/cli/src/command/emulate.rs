@@ -11,12 +11,12 @@ use std::{
 
 use anyhow::{Context, bail, ensure};
 use clap::{Args, ValueEnum};
-use toposlam::Filter;
 use toposlam::drive::VelocityCommand;
 use toposlam::persist::Persist;
 use toposlam::reference::{SONARS, ordered, paper, robust, small};
 use toposlam::robot::RobotConfig;
-use toposlam::wire::{Belief, Evidence, FilterSettings, Location, Message, Worst};
+use toposlam::wire::{Belief, Evidence, FilterSettings, Location, Message, VertexWays, Worst};
+use toposlam::{Filter, VertexId};
 use toposlam_cli::emulator::Emulation;
 use toposlam_cli::progress::Progress;
 use toposlam_sim::exploration::Exploration;
@@ -242,6 +242,11 @@ where
     });
     let same_size = usize::from(heard.replica.vertices()) == map.vertices().len();
     ensure!(same_rows && same_size, "the map of the firmware differs");
+    if let Some(darts) = mapper.filter().darts() {
+        let has_ways =
+            |vertex: VertexId| VertexWays::of(darts, vertex).ways.as_slice() == heard.replica.ways(vertex.into());
+        ensure!(map.vertices().all(has_ways), "the ways of the firmware's map differ");
+    }
     if let Some(step) = steps.last() {
         let (filter, place_index) = (mapper.filter(), step.update.place_index);
         ensure!(heard.replica.location() == Some(Location::from(&step.update)), "the firmware reports another vertex");

@@ -21,7 +21,7 @@ use toposlam_eval::{
     prior::PriorSource,
     report::{Report, Row, SettingsReport},
     run::evaluate,
-    settings::{Filter, Settings},
+    settings::{Capacities, Filter, Settings},
     walk::WalkKind,
 };
 
@@ -116,7 +116,10 @@ struct FilterArguments {
     /// Filter to evaluate [default: ordered with hints of ways, otherwise robust].
     #[arg(long)]
     filter: Option<FilterArgument>,
-    /// Hypotheses (robust) or particles (paper), 1 to 100 [default: 10]. The ordered filter has 10.
+    /// Ordered: the robot whose capacities the filter has [default: reference].
+    #[arg(long, value_name = "ROBOT")]
+    robot: Option<RobotChoice>,
+    /// Hypotheses (robust) or particles (paper), 1 to 100 [default: 10].
     #[arg(long, alias = "particles", value_name = "N")]
     hypotheses: Option<u8>,
     /// Ordered and robust: initial estimate of the standard deviation of a fingerprint, in millimetres
@@ -170,6 +173,14 @@ enum BearingsChoice {
 }
 
 #[derive(Clone, Copy, ValueEnum)]
+enum RobotChoice {
+    /// The reference robot.
+    Reference,
+    /// The small robot (docs/small-robot.md).
+    Small,
+}
+
+#[derive(Clone, Copy, ValueEnum)]
 enum PriorChoice {
     /// All n-grams of the path itself.
     Path,
@@ -213,7 +224,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     let default = if arguments.course.hints.ways { FilterArgument::Ordered } else { FilterArgument::Robust };
     let filters = arguments.filter.chosen(default, arguments.plot.is_some())?;
     let evaluations =
-        filters.iter().map(|&filter| arguments.course.settings(filter)).collect::<anyhow::Result<Vec<_>>>()?;
+        filters.iter().map(|&filter| arguments.course.settings(filter, arguments.filter.robot)).collect::<anyhow::Result<Vec<_>>>()?;
     let settings = &evaluations[0];
     // All errors in the files are reported before the first path starts.
     let cases = arguments.cases.load()?;
@@ -293,7 +304,7 @@ impl CaseArguments {
 }
 
 impl CourseArguments {
-    fn settings(&self, filter: Filter) -> anyhow::Result<Settings> {
+    fn settings(&self, filter: Filter, robot: Option<RobotChoice>) -> anyhow::Result<Settings> {
         let ngram_length = NgramLength::new(self.ngram_length).context("--ngram-length")?;
         let lengths: Vec<usize> = self.lengths.iter().map(|length| length.get()).collect();
         ensure!(lengths.is_sorted_by(|shorter, longer| shorter < longer), "--lengths: must be in ascending order");
@@ -307,6 +318,10 @@ impl CourseArguments {
             walk: self.walk,
             seed: self.seed,
             filter,
+            capacities: match robot {
+                None | Some(RobotChoice::Reference) => Capacities::Reference,
+                Some(RobotChoice::Small) => Capacities::Small,
+            },
             prior: match self.prior {
                 PriorChoice::Path => PriorSource::Path,
                 PriorChoice::Exploration => PriorSource::Exploration,

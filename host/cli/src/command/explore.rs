@@ -176,9 +176,8 @@ fn hint_row(name: &str, noise: f64, runs: &[Run]) -> String {
     let mut all = HintReport::default();
     runs.iter().for_each(|run| all.add(&run.hints));
     let percent = |part: usize, whole: usize| 100.0 * part as f64 / whole.max(1) as f64;
-    let deviation = |errors: &[f64]| {
-        (errors.iter().map(|error| error * error).sum::<f64>() / errors.len().max(1) as f64).sqrt()
-    };
+    let deviation =
+        |errors: &[f64]| (errors.iter().map(|error| error * error).sum::<f64>() / errors.len().max(1) as f64).sqrt();
     let rank = |errors: &[f64]| {
         let mut sizes: Vec<f64> = errors.iter().map(|error| error.abs()).collect();
         sizes.sort_by(f64::total_cmp);

@@ -101,7 +101,13 @@ pub(super) fn run(
                         // The frame counts of the firmware and of the world may differ.
                         let ago = turns.saturating_sub(frame_index);
                         let frame_index = trial.frames.saturating_sub(ago + 1);
-                        trial.exploration.note(&Place { fingerprint, frame_index, degree, ways: Openings::NONE, spread_mm: 0 });
+                        trial.exploration.note(&Place {
+                            fingerprint,
+                            frame_index,
+                            degree,
+                            ways: Openings::NONE,
+                            spread_mm: 0,
+                        });
                         bar.increment();
                     }
                     Message::Velocity(drive) => {

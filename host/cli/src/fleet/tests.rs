@@ -8,7 +8,7 @@ use toposlam_sim::world::Plan;
 
 const PATIENCE: Duration = Duration::from_millis(5);
 const FRAME: Duration = Duration::from_millis(100);
-const LIFE_FRAMES: usize = 1500;
+const LIFE_FRAMES: usize = 6000;
 
 fn lives() -> Vec<Life> {
     [("office", 1), ("ring", 2)]

@@ -1,18 +1,29 @@
-//! The ordered filter as a candidate, with the capacities of the reference robot.
+//! The ordered filter as a candidate, with the capacities of the reference robot or of the small one.
 
 use super::{Candidate, VERTICES, widened};
 use crate::{
     rotation::{RotationSystem, partner},
-    settings::{Filter, Settings},
+    settings::{Capacities, Filter, Settings},
     trial::{Trial, Truth},
 };
 use std::f64::consts::TAU;
 use toposlam::Filter as _;
-use toposlam::reference::ordered::{self as reference, DARTS, HISTORY};
-use toposlam::{Bearing, DartMap, FaultKind, Map, Observation, OrderedConfig, VertexId};
+use toposlam::reference::{ordered, small};
+use toposlam::{Bearing, DartMap, FaultKind, Map, Observation, OrderedConfig, OrderedFilter, VertexId};
 
 pub(super) fn start(settings: &Settings, trial: &Trial) -> Box<dyn Candidate> {
-    let mut filter = Box::new(reference::Filter::new());
+    match settings.capacities {
+        Capacities::Reference => start_with(ordered::Filter::new(), settings, trial),
+        Capacities::Small => start_with(small::Filter::new(), settings, trial),
+    }
+}
+
+fn start_with<const N: usize, const V: usize, const D: usize, const T: usize>(
+    filter: OrderedFilter<N, V, D, T>,
+    settings: &Settings,
+    trial: &Trial,
+) -> Box<dyn Candidate> {
+    let mut filter = Box::new(filter);
     let config = if let Filter::Ordered(config) = settings.filter { config } else { OrderedConfig::DEFAULT };
     let started = filter.start(config, trial.filter_seed);
     assert!(started.is_ok(), "the configuration was checked");
@@ -21,12 +32,12 @@ pub(super) fn start(settings: &Settings, trial: &Trial) -> Box<dyn Candidate> {
 
 /// The filter, and the vertex of every place so far. The filter decides about the places of its history again at every update;
 /// for older ones the last decision counts.
-struct Ordered {
-    filter: Box<reference::Filter>,
+struct Ordered<const N: usize, const V: usize, const D: usize, const T: usize> {
+    filter: Box<OrderedFilter<N, V, D, T>>,
     path: Vec<Option<VertexId>>,
 }
 
-impl Ordered {
+impl<const N: usize, const V: usize, const D: usize, const T: usize> Ordered<N, V, D, T> {
     fn update_path(&mut self) {
         let count = self.path.len();
         for (step, vertex) in self.path.iter_mut().enumerate() {
@@ -36,7 +47,7 @@ impl Ordered {
     }
 }
 
-impl Candidate for Ordered {
+impl<const N: usize, const V: usize, const D: usize, const T: usize> Candidate for Ordered<N, V, D, T> {
     fn observe(&mut self, observation: Observation) {
         self.filter.observe(observation);
         self.path.push(None);
@@ -49,7 +60,7 @@ impl Candidate for Ordered {
 
     fn search_from(&self, trial: &Trial, truth: &Truth, steps: u32) -> Option<Box<dyn Candidate>> {
         let places = truth.classes.len();
-        if places > HISTORY || trial.places_before() > 0 {
+        if places > T || trial.places_before() > 0 {
             return None;
         }
         let (map, number) = true_map(trial)?;
@@ -82,7 +93,7 @@ impl Candidate for Ordered {
 
 /// The environment of a path as a map of the filter, and the number of each of its darts there. `None` without ways, or when
 /// the map has no room.
-fn true_map(trial: &Trial) -> Option<(DartMap<{ reference::VERTICES }, DARTS>, Vec<u8>)> {
+fn true_map<const V: usize, const D: usize>(trial: &Trial) -> Option<(DartMap<V, D>, Vec<u8>)> {
     let corridors = trial.corridors.as_ref()?;
     let rotation = corridors.rotation();
     let mut map = DartMap::EMPTY;

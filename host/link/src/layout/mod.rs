@@ -49,6 +49,15 @@ pub struct Point {
     pub y: f64,
 }
 
+/// The longest edge of a map with ways that does not make vertices move.
+const LONGEST: f64 = 2.0;
+/// Sweeps of smoothing to shorten edges.
+const SWEEPS: u32 = 16;
+
+fn longest(graph: &graph::Graph, points: &[Point]) -> f64 {
+    graph.edges().iter().map(|&(a, b)| (points[a] - points[b]).length()).fold(0.0, f64::max)
+}
+
 /// Positions for the vertices of a growing map.
 ///
 /// Deterministic: the same maps in the same order give the same layout.
@@ -122,6 +131,7 @@ impl Layout {
         let graph = &self.network.graph;
         let left = untangling::untangle(graph, &mut self.points);
         if left == 0 {
+            self.shorten(&before);
             return;
         }
         let points = redrawing::redraw(graph, &before);
@@ -130,6 +140,25 @@ impl Layout {
         let is_worth_it = redrawn == 0 || 2 * redrawn < left || left > conflicts::crossings(graph, &self.points);
         if redrawn < left && is_worth_it {
             self.points = points;
+        }
+    }
+
+    /// The order of the ways leaves little room for a new vertex, so that edges become long. Then the vertices move, and if
+    /// that does not suffice, the map is redrawn.
+    fn shorten(&mut self, before: &[Point]) {
+        let graph = &self.network.graph;
+        if !graph.is_ordered() || longest(graph, &self.points) <= LONGEST {
+            return;
+        }
+        let all: Vec<usize> = (0..graph.vertices()).collect();
+        smoothing::smooth(graph, &mut self.points, &all, before, SWEEPS);
+        if longest(graph, &self.points) > LONGEST {
+            let mut points = redrawing::redraw(graph, &vec![Point::UNKNOWN; all.len()]);
+            redrawing::lay_over(&mut points, before, true);
+            let is_sound = conflicts::conflicts(graph, &points) == 0;
+            if is_sound && longest(graph, &points) < longest(graph, &self.points) {
+                self.points = points;
+            }
         }
     }
 

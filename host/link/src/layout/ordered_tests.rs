@@ -100,7 +100,7 @@ fn a_map_with_ways_arranged_at_once_is_drawn_in_their_order_without_crossings() 
 
 #[test]
 fn a_growing_map_with_ways_is_drawn_in_their_order_at_every_step() {
-    let mut slowest = Duration::ZERO;
+    let (mut slowest, mut longest) = (Duration::ZERO, 0.0_f64);
     for seed in 0..6 {
         let mut layout = Layout::new();
         for map in grown(18, &mut Xoshiro256PlusPlus::seed_from_u64(seed)) {
@@ -108,9 +108,11 @@ fn a_growing_map_with_ways_is_drawn_in_their_order_at_every_step() {
             layout.arrange(&map);
             slowest = slowest.max(begun.elapsed());
             assert_sound(&map, &layout);
+            longest = longest.max(super::longest(&layout.network.graph, &layout.points));
         }
     }
-    println!("the slowest update took {slowest:?}");
+    println!("the slowest update took {slowest:?}, the longest edge is {longest:.1}");
+    assert!(longest < 5.0, "{longest}");
 }
 
 #[test]

@@ -121,7 +121,7 @@ fn mean_length(graph: &Graph, points: &[Point]) -> f64 {
 }
 
 /// Rotates and translates a drawing to the best fit with the previous one; mirrors it too if it has no order.
-fn lay_over(points: &mut [Point], before: &[Point], is_ordered: bool) {
+pub(super) fn lay_over(points: &mut [Point], before: &[Point], is_ordered: bool) {
     let pairs = || points.iter().zip(before).filter(|(_, before)| before.is_known());
     let (from, to) = (geometry::mean(pairs().map(|pair| *pair.0)), geometry::mean(pairs().map(|pair| *pair.1)));
     let mirror = |point: Point, sign: f64| Point::new(point.x, sign * point.y);

@@ -20,6 +20,21 @@ pub struct Told {
     pub ways: Option<Ways>,
 }
 
+impl Told {
+    /// The hints in numbers: the bearings of the ways other than the one the robot came by and the exit, in milliradians from that
+    /// way, and the travel time, 0 if it is unknown.
+    pub fn recorded(&self) -> (Option<Vec<u16>>, Option<u16>, u16) {
+        let milliradians = |bearing: u8| ((u32::from(bearing) * 6283 + 128) / 256) as u16;
+        let others = self.ways.and_then(|ways| Some(ways.others()?.iter().copied().map(milliradians).collect()));
+        let exit = match self.passage.exit {
+            None | Some(Exit::On) => None,
+            Some(Exit::Back) => Some(0),
+            Some(Exit::Bearing(bearing)) => Some(milliradians(bearing)),
+        };
+        (others, exit, self.passage.travel_frames.unwrap_or(0))
+    }
+}
+
 /// Counts of right, wrong and missing hints. Places count where the robot drove along one edge from the place before.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct HintReport {

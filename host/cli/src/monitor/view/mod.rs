@@ -106,8 +106,7 @@ fn heading(model: &Model) -> Line<'_> {
         (_, false) => Span::styled("may lack something", Style::new().fg(Color::Yellow)),
     };
     let explored = picture.exploration().map_or_else(String::new, |exploration| {
-        let frontiers = many(exploration.frontiers.into(), "frontier", "frontiers");
-        format!(", {frontiers}{}", if exploration.complete { ", complete" } else { "" })
+        if exploration.complete { ", complete".to_owned() } else { format!(", {} open", exploration.frontiers) }
     });
     let (vertices, edges) = (map.vertices.len(), map.all_edges().len());
     let size = format!(" {}, {}{explored} ", many(vertices, "vertex", "vertices"), many(edges, "edge", "edges"));
