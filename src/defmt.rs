@@ -101,7 +101,7 @@ impl Format for Echo {
 
 impl Format for Place {
     fn format(&self, f: Formatter<'_>) {
-        let Self { fingerprint, frame_index, degree, ways, spread_mm } = self;
+        let Self { fingerprint, frame_index, degree, ways, behind_mrad: _, spread_mm } = self;
         write!(f, "place of {} in frame {=u32}, degree {}", fingerprint, frame_index, degree);
         write!(f, ", ways at {} mrad, spread {=u16} mm", ways.bearings_mrad(), spread_mm);
     }

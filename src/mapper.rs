@@ -119,7 +119,7 @@ impl<const SONARS: usize, const V: usize, F: Filter<V>> Mapper<SONARS, V, F> {
             let starts_sequence = core::mem::take(&mut self.starts_sequence);
             self.refinement_steps = 0;
             let Passage { exit, travel_frames, .. } = passage;
-            let ways = passage.ways(&place.ways, self.detector.rotation_mrad());
+            let ways = passage.ways(&place, self.detector.rotation_mrad());
             let observation =
                 Observation { fingerprint: place.fingerprint, ways, exit, travel_frames, starts_sequence };
             return Some((place, self.filter.observe(observation)));

@@ -9,6 +9,7 @@ use std::sync::LazyLock;
 use arbitrary::Arbitrary;
 use expected::{Expected, Staged};
 use libfuzzer_sys::fuzz_target;
+use toposlam::RobustConfig;
 use toposlam::persist::Persist;
 use toposlam::persist::snapshot::Writer;
 use toposlam::place::PlaceDetector;

@@ -7,7 +7,7 @@ use arbitrary::Arbitrary;
 use libfuzzer_sys::fuzz_target;
 use toposlam::Filter;
 use toposlam::persist::Persist;
-use toposlam::persist::snapshot::{FILTER_SECTION, SNAPSHOT_VERSION, SnapshotError, Writer};
+use toposlam::persist::snapshot::{SNAPSHOT_VERSION, SnapshotError};
 use toposlam::wire::crc32;
 use toposlam_fuzz::filters::{self, Seen, Small};
 
@@ -120,9 +120,9 @@ fn snapshot(source: &Source<'_>) -> Vec<u8> {
         Source::Changed { which, edits } => {
             let snapshot = &TRUE[usize::from(*which) % TRUE.len()];
             let contents = &snapshot[15..snapshot.len() - 4];
-            of_contents(&edited(contents, edits))
+            filters::of_contents(&edited(contents, edits))
         }
-        Source::Contents(contents) => of_contents(contents),
+        Source::Contents(contents) => filters::of_contents(contents),
         Source::Sections(sections) => {
             let mut snapshot = b"TSLM".to_vec();
             snapshot.extend(SNAPSHOT_VERSION.to_le_bytes());
@@ -134,14 +134,6 @@ fn snapshot(source: &Source<'_>) -> Vec<u8> {
         Source::Whole(snapshot) => snapshot.to_vec(),
         Source::Damaged { which, edits } => edited(&TRUE[usize::from(*which) % TRUE.len()], edits),
     }
-}
-
-fn of_contents(contents: &[u8]) -> Vec<u8> {
-    let mut snapshot = vec![0; contents.len() + 19];
-    let mut writer = Writer::new(&mut snapshot).unwrap();
-    writer.section(FILTER_SECTION, |section| section.bytes(contents)).unwrap();
-    assert_eq!(writer.finish(), Ok(snapshot.len()));
-    snapshot
 }
 
 fn edited(bytes: &[u8], edits: &Edits<'_>) -> Vec<u8> {

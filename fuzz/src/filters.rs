@@ -2,7 +2,7 @@
 
 use arbitrary::Arbitrary;
 use toposlam::persist::snapshot::{FILTER_SECTION, Reader, Snapshot, SnapshotError, Writer};
-use toposlam::{Filter, Fingerprint, Map, Observation, RobustConfig, RobustFilter, Turn, Update, VertexId};
+use toposlam::{Exit, Filter, Fingerprint, Map, Observation, RobustConfig, RobustFilter, Update, VertexId, Ways};
 
 /// The most hypotheses of a [`Small`] filter.
 pub const HYPOTHESES: usize = 4;
@@ -32,12 +32,14 @@ impl Seen {
     pub fn observation(self) -> Observation {
         Observation {
             fingerprint: Fingerprint::from_steps(self.steps % (Fingerprint::MAX.steps() + 1)).unwrap(),
-            turn: match self.hints & 3 {
-                0 => Some(Turn::Back),
-                1 => Some(Turn::On),
+            exit: match self.hints & 3 {
+                0 => Some(Exit::Back),
+                1 => Some(Exit::On),
+                2 => Some(Exit::Bearing(self.hints)),
                 _ => None,
             },
-            degree: (self.hints & 4 != 0).then_some(self.hints >> 4),
+            ways: Ways::from_count(self.hints >> 4).ok().filter(|_| self.hints & 4 != 0),
+            travel_frames: Some(self.steps >> 8).filter(|_| self.hints & 8 != 0),
             starts_sequence: self.hints & 0xF8 == 0xF8,
         }
     }
@@ -48,8 +50,8 @@ pub fn walk(index: usize) -> Observation {
     let room = index * index % 11 % 7;
     let steps = [400, 580, 400, 760, 1000, 1010, 1400][room] + (index * 5 % 13) as u16;
     Observation {
-        turn: [None, Some(Turn::On), Some(Turn::Back)][index % 3],
-        degree: index.is_multiple_of(4).then_some(1 + room as u8 / 2),
+        exit: [None, Some(Exit::On), Some(Exit::Back)][index % 3],
+        ways: Ways::from_count(1 + room as u8 / 2).ok().filter(|_| index.is_multiple_of(4)),
         starts_sequence: index == 17,
         ..Observation::new(Fingerprint::from_steps(steps).unwrap())
     }
@@ -86,6 +88,15 @@ pub fn saved(filter: &mut Small) -> Vec<u8> {
     writer.stage(filter).expect("the buffer has room for the whole filter");
     let length = writer.finish().unwrap();
     buffer[..length].to_vec()
+}
+
+/// A snapshot with these contents of the filter's section and a valid CRC.
+pub fn of_contents(contents: &[u8]) -> Vec<u8> {
+    let mut snapshot = vec![0; contents.len() + 19];
+    let mut writer = Writer::new(&mut snapshot).unwrap();
+    writer.section(FILTER_SECTION, |section| section.bytes(contents)).unwrap();
+    assert_eq!(writer.finish(), Ok(snapshot.len()));
+    snapshot
 }
 
 /// The contents of the filter's section.

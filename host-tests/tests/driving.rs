@@ -1,18 +1,17 @@
-//! Exploration of the simulated world with faulty sonars: collisions, places found, and turn hints.
+//! Exploration of the simulated world: completeness, and with faulty sonars collisions, places found and hints.
 
-use toposlam::Exit;
-use toposlam::reference::SNAPSHOT_BYTES;
+use toposlam::reference::{SNAPSHOT_BYTES, robust};
+use toposlam::wire::Command;
 use toposlam_eval::mapping::score_exploration;
 use toposlam_sim::exploration::Exploration;
-use toposlam_sim::world::{Plan, Report, RobotModel, SonarModel};
+use toposlam_sim::world::{HintReport, Plan, Report, RobotModel, SonarModel, Told};
 
 /// The result of an exploration.
 struct Outcome {
     report: Report,
     /// Frames in which the robot touched a wall.
     touched: u32,
-    /// Number of right and of wrong turn hints.
-    turns: (usize, usize),
+    hints: HintReport,
     /// Share of the places that the final map assigns to the right vertex.
     located: f64,
 }
@@ -23,18 +22,14 @@ fn explore(plan: &str, sonar: SonarModel, seed: u64, places: usize) -> Outcome {
     let mut buffer = [0; SNAPSHOT_BYTES];
     let model = RobotModel { sonar, ..RobotModel::default() };
     let mut exploration = Exploration::start(&plan, model, seed, &mut buffer).unwrap();
-    let (mut told, mut turns) = (None, (0, 0));
     while exploration.places() < places {
         assert!(exploration.frames() < 1000 * places as u64, "after {} places", exploration.places());
-        let found = exploration.advance().is_some();
-        if let ([.., Some(before), Some(_), Some(now)], true, Some(turn)) = (exploration.nodes(), found, told) {
-            let is_right = (turn == Exit::Back) == (before == now);
-            turns = (turns.0 + usize::from(is_right), turns.1 + usize::from(!is_right));
-        }
-        told = exploration.robot().drive().passage().exit;
+        exploration.advance();
     }
     let report = exploration.ground_truth().report();
-    Outcome { report, touched: exploration.rover().bumps(), turns, located: score_exploration(&exploration).location }
+    let told: Vec<Told> = exploration.steps().iter().map(|step| step.told).collect();
+    let hints = exploration.ground_truth().hint_report(&told);
+    Outcome { report, touched: exploration.rover().bumps(), hints, located: score_exploration(&exploration).location }
 }
 
 #[test]
@@ -51,16 +46,18 @@ fn with_the_sonar_ahead_dead_the_robot_touches_no_wall_and_finds_its_places() {
 #[test]
 fn with_a_sonar_at_the_side_dead_no_corridor_is_a_place() {
     let sonar = SonarModel { dead_sonars: 1 << 4, ..SonarModel::default() };
-    let Outcome { report, turns: (right, wrong), .. } = explore("ring", sonar, 0, 100);
+    let Outcome { report, hints, .. } = explore("ring", sonar, 0, 100);
     assert!(report.phantom + report.doubled <= 1, "{report}");
-    assert!(right > 80 && wrong <= 3, "{right} right, {wrong} wrong");
+    let (told, wrong, _) = hints.exits;
+    assert!(told > 80 && wrong <= 3, "{told} exits told, {wrong} wrong");
 }
 
 #[test]
-fn with_a_tenth_of_the_echoes_missed_the_turn_hints_are_right() {
+fn with_a_tenth_of_the_echoes_missed_the_exits_are_right() {
     let sonar = SonarModel { missed_share: 0.1, ..SonarModel::default() };
-    let Outcome { report, turns: (right, wrong), located, .. } = explore("office", sonar, 0, 100);
-    assert!(right > 80 && wrong <= 3, "{right} right, {wrong} wrong");
+    let Outcome { report, hints, located, .. } = explore("office", sonar, 0, 100);
+    let (told, wrong, _) = hints.exits;
+    assert!(told > 80 && wrong <= 3, "{told} exits told, {wrong} wrong");
     assert!(report.missed + report.phantom + report.doubled <= 3, "{report}");
     assert!(located > 0.9, "{located}");
 }
@@ -70,4 +67,75 @@ fn walls_detected_at_a_flat_angle_are_not_places() {
     let sonar = SonarModel { specular_limit_rad: 35_f64.to_radians(), ..SonarModel::default() };
     let Outcome { report, .. } = explore("office", sonar, 0, 100);
     assert!(report.phantom + report.doubled <= 1, "{report}");
+}
+
+#[test]
+fn exits_ways_and_travel_times_are_right() {
+    let Outcome { hints, .. } = explore("ladder", SonarModel::default(), 2, 60);
+    let (told, wrong, unknown) = hints.exits;
+    assert!(told > 50 && wrong <= 1 && unknown <= 1, "{:?}", hints.exits);
+    let (ways, missed, not_there) = hints.ways;
+    assert!(ways > 50 && missed <= 1 && not_there <= 1, "{:?}", hints.ways);
+    assert!(hints.bearing_errors_rad.iter().all(|error_rad| error_rad.abs() < 0.4));
+    assert!(hints.travel_errors.iter().all(|error| error.abs() < 0.15), "{:?}", hints.travel_errors);
+}
+
+#[test]
+fn a_robot_without_ways_explores_at_random_and_has_no_path_to_a_vertex() {
+    let plan = Plan::built_in("office").unwrap();
+    let mut buffer = [0; robust::SNAPSHOT_BYTES];
+    let model = RobotModel::default();
+    let mut exploration =
+        Exploration::<{ robust::VERTICES }, robust::Filter>::with_robot(&plan, model, 1, &robust::ROBOT, &mut buffer)
+            .unwrap();
+    while exploration.places() < 30 {
+        exploration.advance();
+    }
+    let robot = exploration.robot();
+    let map = robot.mapper().map();
+    assert!(map.edges().count() > 2);
+    assert!(map.vertices().all(|vertex| !robot.drive().leads_to(robot.mapper().filter(), vertex)));
+    assert!(!robot.drive().is_complete());
+}
+
+#[test]
+fn a_map_is_complete_when_every_way_was_driven_and_the_robot_goes_on() {
+    let plan = Plan::built_in("office").unwrap();
+    let mut buffer = [0; SNAPSHOT_BYTES];
+    let mut exploration = Exploration::start(&plan, RobotModel::default(), 3, &mut buffer).unwrap();
+    let edges = exploration.rover().true_map().edges.len();
+    while !exploration.robot().drive().is_complete() {
+        exploration.advance();
+        assert!(exploration.places() < 4 * edges, "{} places", exploration.places());
+    }
+    assert!(score_exploration(&exploration).exact);
+    assert_eq!(exploration.robot().mapper().map().edges().count(), edges);
+    let places = exploration.places();
+    while exploration.places() < places + 30 {
+        exploration.advance();
+        assert!(exploration.robot().drive().is_complete());
+    }
+    assert!(score_exploration(&exploration).exact);
+}
+
+#[test]
+fn one_of_two_parallel_corridors_is_the_shorter_way_to_a_vertex() {
+    // Two junctions of the ladder are joined by a rail and, around the other rail, by the rungs. No path has more than five edges,
+    // from a dead end to the farthest.
+    let plan = Plan::built_in("ladder").unwrap();
+    let mut buffer = [0; SNAPSHOT_BYTES];
+    let mut exploration = Exploration::start(&plan, RobotModel::default(), 1, &mut buffer).unwrap();
+    while !exploration.robot().drive().is_complete() {
+        exploration.advance();
+    }
+    for vertex in exploration.robot().mapper().map().vertices().map(u8::from).collect::<Vec<_>>() {
+        let places = exploration.places();
+        exploration.command(Command::GoTo { vertex });
+        exploration.advance();
+        while exploration.is_underway() {
+            exploration.advance();
+        }
+        let steps = exploration.places() - places;
+        assert!(steps <= 5, "{steps} places to vertex {vertex}");
+    }
 }

@@ -7,7 +7,7 @@ use toposlam::reference::{self, SONARS, VERTICES, ordered, paper, robust};
 use toposlam::wire::{
     Arrival, Belief, Capacities, Header, Hello, Location, MapReplica, Message, Reporter, ResetCause, Worst,
 };
-use toposlam::{Exit, FaultCounters, Filter, Mapper, MapperConfig, Observation, Ways};
+use toposlam::{Exit, FaultCounters, Filter, Mapper, MapperConfig, Observation};
 use toposlam_sim::world::{Plan, RobotModel, Simulation};
 
 fn config<C: Copy>(filter: C) -> MapperConfig<SONARS, C> {
@@ -29,7 +29,7 @@ fn the_filter_observes_radius_ways_and_exit() {
         if let Some((place, _)) = mapper.observe(&frame, truth.passage()) {
             expected.push(Observation {
                 exit: truth.turn,
-                ways: place.degree.and_then(|degree| Ways::from_count(degree).ok()),
+                ways: truth.passage().ways(&place, 0),
                 ..Observation::new(place.fingerprint)
             });
         }
@@ -39,7 +39,7 @@ fn the_filter_observes_radius_ways_and_exit() {
     }
     assert_eq!(mapper.filter().observations, expected);
     assert!(expected.iter().any(|observation| observation.exit == Some(Exit::Back)));
-    assert!(expected.iter().any(|observation| observation.ways == Ways::from_count(3).ok()));
+    assert!(expected.iter().any(|observation| observation.ways.is_some_and(|ways| ways.count() == 3)));
     let capacities = Capacities::of_mapper::<SONARS, VERTICES, Notes>(&config(99));
     assert_eq!((capacities.hypotheses, capacities.history, capacities.ngram_length), (7, 99, 3));
 }

@@ -16,6 +16,10 @@ const SAME_OPENING_MRAD: u16 = 700;
 const FACING_MRAD: i32 = 200;
 /// Where all sensors within [`FACING_MRAD`] are dead, sensors within this angle replace them, in milliradians.
 const FACING_BESIDE_DEAD_MRAD: i32 = 600;
+/// On the way out an exit is searched within this angle of where it was, in milliradians,
+const EXIT_MRAD: u16 = 500;
+/// and the robot does not steer off its bearing by more than this.
+const ASIDE_MRAD: i16 = 200;
 /// With the sensors ahead dead the robot sways by this angle to either side, in milliradians,
 const SWAY_MRAD: i16 = 260;
 /// for this number of frames each; a power of two.
@@ -88,6 +92,8 @@ pub(super) struct LocalPlanner {
     target_mrad: i16,
     /// Change of all bearings since the frame before.
     rotation_mrad: i32,
+    /// The same for each frame of a turn to an exit, smoothed.
+    turn_rate_mrad: i32,
     /// The degree of the place by the detector.
     degree: Option<u8>,
     departure: Departure,
@@ -103,6 +109,7 @@ impl LocalPlanner {
             entry_mrad: 0,
             target_mrad: 0,
             rotation_mrad: 0,
+            turn_rate_mrad: 0,
             degree: None,
             departure: Departure::UNKNOWN,
             faults: FaultCounters::new(),
@@ -217,7 +224,7 @@ impl LocalPlanner {
             self.enter(DriveState::Approach);
             return self.approach(scan, obstacles);
         }
-        self.drive(scan, Sector::EDGE, obstacles.spread_mm())
+        self.drive(scan, Sector::EDGE, obstacles.spread_mm(), None)
     }
 
     fn approach<const SONARS: usize>(&mut self, scan: &RingScan<'_, SONARS>, obstacles: &Obstacles) -> VelocityCommand {
@@ -240,8 +247,8 @@ impl LocalPlanner {
                 let distance_mm = offset.length().clamp(0, i32::from(BRAKE_MM)) as u16;
                 VelocityCommand { heading_mrad, speed_permille: self.speed_permille_at(distance_mm) }
             }
-            // The third obstacle may be in front of a dead sensor: turn until another one sees it.
-            None if self.frames > CHOOSE_FRAMES && scan.echoes().any(|(echo, _)| echo == Echo::Dead) => {
+            // The third obstacle may be in front of a dead sensor, or at a flat angle: turn until another one sees it.
+            None if self.frames > CHOOSE_FRAMES => {
                 VelocityCommand { heading_mrad: FACING_MRAD as i16, speed_permille: 0 }
             }
             _ => VelocityCommand::STOP,
@@ -275,6 +282,7 @@ impl LocalPlanner {
         };
         self.departure = Departure { is_known: true, exit_mrad, driven_permille: 0 };
         self.target_mrad = rotated(self.entry_mrad, exit_mrad.into());
+        self.turn_rate_mrad = 0;
         self.enter(DriveState::TurnToExit);
         self.turn_to_exit(scan, obstacles)
     }
@@ -287,9 +295,15 @@ impl LocalPlanner {
         if self.is_timed_out() {
             return self.give_up(scan);
         }
-        // An exit that this frame does not show is where the rotation of the ring brings it.
-        let expected_mrad = rotated(self.target_mrad, self.rotation_mrad);
-        let seen = scan.openings(obstacles).nearest(expected_mrad, SAME_OPENING_MRAD);
+        // An exit that this frame does not show is where the rotation of the ring brings it. The robot turns towards the exit.
+        self.turn_rate_mrad += (self.rotation_mrad - self.turn_rate_mrad) / 4;
+        let towards_mrad = if self.target_mrad < 0 { self.turn_rate_mrad.max(0) } else { self.turn_rate_mrad.min(0) };
+        let expected_mrad = rotated(self.target_mrad, towards_mrad);
+        let openings = scan.openings(obstacles);
+        // A dead end has no other opening.
+        let is_dead_end = self.degree == Some(1) && openings.count() == 1;
+        let within_mrad = if is_dead_end { HALF_TURN_MRAD as u16 } else { SAME_OPENING_MRAD };
+        let seen = openings.nearest(expected_mrad, within_mrad);
         let target_mrad = seen.map_or(expected_mrad, |(_, target_mrad)| target_mrad);
         // Straight behind, noise must not reverse the direction of the turn.
         let is_behind = turn_mrad(HALF_TURN_MRAD, target_mrad).abs() < i32::from(SAME_OPENING_MRAD);
@@ -302,7 +316,7 @@ impl LocalPlanner {
         let is_certain = seen.is_some() || facing_mrad > FACING_MRAD;
         if is_certain && i32::from(self.target_mrad).abs() <= facing_mrad {
             self.enter(DriveState::Depart);
-            return self.drive(scan, Sector::EXIT, None);
+            return self.drive(scan, Sector::EXIT, None, seen.map(|_| self.target_mrad));
         }
         VelocityCommand { heading_mrad: self.target_mrad, speed_permille: 0 }
     }
@@ -320,7 +334,10 @@ impl LocalPlanner {
             self.enter(DriveState::FollowEdge);
             return self.follow_edge(scan, obstacles, is_at_place);
         }
-        self.drive(scan, Sector::EXIT, None)
+        // At a crossing, a sensor that should measure the obstacle beside the exit may measure the next one.
+        let seen = scan.openings(obstacles).nearest(self.target_mrad, EXIT_MRAD);
+        self.target_mrad = seen.map_or(self.target_mrad, |(_, target_mrad)| target_mrad);
+        self.drive(scan, Sector::EXIT, None, seen.map(|_| self.target_mrad))
     }
 
     fn recover<const SONARS: usize>(&mut self, scan: &RingScan<'_, SONARS>) -> VelocityCommand {
@@ -347,17 +364,23 @@ impl LocalPlanner {
         VelocityCommand { heading_mrad: self.target_mrad, speed_permille: 0 }
     }
 
-    /// Drives along the edge between the obstacles in a sector, more slowly with a smaller spread.
+    /// Drives along the edge between the obstacles in a sector, more slowly with a smaller spread. The heading is that of the exit
+    /// within [`ASIDE_MRAD`].
     fn drive<const SONARS: usize>(
         &mut self,
         scan: &RingScan<'_, SONARS>,
         sector: Sector,
         spread_mm: Option<u16>,
+        exit_mrad: Option<i16>,
     ) -> VelocityCommand {
         if nearest_ahead(scan).is_some_and(|ahead| ahead.range_mm < self.config.clearance_mm) {
             return self.give_up(scan);
         }
-        let heading_mrad = edge_heading_mrad(scan, sector, self.config.look_ahead_mm).unwrap_or(0);
+        let mut heading_mrad = edge_heading_mrad(scan, sector, self.config.look_ahead_mm).unwrap_or(0);
+        if let Some(exit_mrad) = exit_mrad {
+            let (least_mrad, most_mrad) = (exit_mrad.saturating_sub(ASIDE_MRAD), exit_mrad.saturating_add(ASIDE_MRAD));
+            heading_mrad = heading_mrad.max(least_mrad).min(most_mrad);
+        }
         let heading_mrad = heading_mrad.clamp(-MAX_HEADING_MRAD, MAX_HEADING_MRAD).saturating_add(self.sway_mrad(scan));
         VelocityCommand { heading_mrad, speed_permille: self.speed_permille_at(spread_mm.unwrap_or(u16::MAX)) }
     }

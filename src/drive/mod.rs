@@ -132,11 +132,11 @@ impl<const V: usize> Drive<V> {
         self.local_planner.set_speed(speed_permille)
     }
 
-    /// Whether the map is complete: the robot knows of no way that it has not driven and could reach. It then patrols the ways
-    /// with the fewest passages, so that mistakes of the map are found.
+    /// Whether the map is complete: each way that the robot could reach was driven, and each edge twice. It patrols the edges with
+    /// the fewest passages, so that mistakes of the map are found.
     ///
     /// A way that at most a third of the visits to its vertex have shown does not count. The map must be more likely than not, and
-    /// both must hold at two successive places; three successive places with a way to drive end it.
+    /// all must hold at two more successive places than the map has edges; three successive places with a way to drive end it.
     pub const fn is_complete(&self) -> bool {
         self.route_planner.is_complete()
     }

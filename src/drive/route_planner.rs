@@ -13,10 +13,10 @@ use crate::place::Obstacles;
 const REACHED_Q16: u32 = 1 << 15;
 /// Minimum probability of a map that counts as complete, in units of 2⁻¹⁶.
 const COMPLETE_Q16: u32 = 1 << 15;
-/// Successive places without a way to drive after which a map is complete.
-const COMPLETE_PLACES: u8 = 2;
 /// Successive places with a way to drive after which a map is no longer complete.
-const INCOMPLETE_PLACES: u8 = 3;
+const INCOMPLETE_PLACES: usize = 3;
+/// An edge with fewer passages is not confirmed.
+const CONFIRMED_PASSAGES: u8 = 2;
 /// An exit is matched to the way of the map whose bearing differs by at most this, in units of 2⁻¹⁶ of a turn: 0.55 rad.
 const SAME_WAY: u16 = 5736;
 
@@ -156,14 +156,17 @@ impl<const V: usize> RoutePlanner<V> {
 
     fn update_completeness(&mut self, filter: &impl Filter<V>) {
         let (Some(darts), Some(here)) = (filter.darts(), filter.recent(0)) else { return };
-        let has_frontier = frames_to_frontier(filter, darts)[here].is_some();
-        let seems_complete = !has_frontier && filter.map_probability_q16() >= COMPLETE_Q16;
-        if seems_complete == self.is_complete || self.is_complete && !has_frontier {
+        let is_due = frames_to_way::<V>(darts, |way| is_frontier(filter, darts, way) || is_unconfirmed(darts, way));
+        let is_due = is_due[here].is_some();
+        let seems_complete = !is_due && filter.map_probability_q16() >= COMPLETE_Q16;
+        if seems_complete == self.is_complete || self.is_complete && !is_due {
             self.contrary_places = 0;
             return;
         }
         self.contrary_places = self.contrary_places.saturating_add(1);
-        if self.contrary_places >= if self.is_complete { INCOMPLETE_PLACES } else { COMPLETE_PLACES } {
+        // A map is complete when it has stood a patrol of as many places as it has edges.
+        let patrol = darts.edges().count() + 2;
+        if usize::from(self.contrary_places) >= if self.is_complete { INCOMPLETE_PLACES } else { patrol } {
             self.is_complete = !self.is_complete;
             self.contrary_places = 0;
         }
@@ -202,22 +205,24 @@ impl<const V: usize> RoutePlanner<V> {
         }
     }
 
-    /// The exit with the shortest travel time to a way that is new, or the one with the fewest passages. At random among equals.
+    /// The exit with the shortest travel time to a way that is new, or to one with the fewest passages.
     fn explore(&self, filter: &impl Filter<V>, here: &Here<'_>) -> Option<usize> {
         let darts = here.darts;
-        let frames = frames_to_frontier(filter, darts);
-        let to_frontier = |exit: usize| match here.way(exit) {
-            Some(way) if is_frontier(filter, darts, way) => Some(0),
+        self.towards_way(here, |way| is_frontier(filter, darts, way)).or_else(|| {
+            let least = darts.edges().map(|(way, _)| darts.passages(way)).min()?;
+            self.towards_way(here, |way| darts.partner(way).is_some() && darts.passages(way) == least)
+        })
+    }
+
+    /// The exit with the shortest travel time to a way that `is_due`, at random among equals; `None` if there is no path to one.
+    fn towards_way(&self, here: &Here<'_>, is_due: impl Fn(DartId) -> bool) -> Option<usize> {
+        let frames = frames_to_way::<V>(here.darts, &is_due);
+        let to_way = |exit: usize| match here.way(exit) {
+            Some(way) if is_due(way) => Some(0),
             _ => here.frames(exit, &frames),
         };
-        let exits = 0..here.exits.len();
-        if let Some(least) = exits.clone().filter_map(to_frontier).min() {
-            return self.at_random(here.exits.len(), |exit| to_frontier(exit) == Some(least));
-        }
-        let passages =
-            |exit: usize| here.way(exit).filter(|&way| darts.partner(way).is_some()).map(|way| darts.passages(way));
-        let least = exits.filter_map(passages).min()?;
-        self.at_random(here.exits.len(), |exit| passages(exit) == Some(least))
+        let least = (0..here.exits.len()).filter_map(to_way).min()?;
+        self.at_random(here.exits.len(), |exit| to_way(exit) == Some(least))
     }
 
     /// The exit with the shortest travel time to the target. If the map has no path, an exit that is new, or that the map does not
@@ -252,9 +257,14 @@ fn is_frontier<const V: usize>(filter: &impl Filter<V>, darts: Darts<'_>, way: D
     darts.partner(way).is_none() && 3 * u32::from(darts.sightings(way)) > visits
 }
 
-/// The travel time from each vertex to the nearest one with a way that is new.
-fn frames_to_frontier<const V: usize>(filter: &impl Filter<V>, darts: Darts<'_>) -> PerVertex<Option<u32>, V> {
-    frames_to(darts, |vertex| darts.ways(vertex).any(|way| is_frontier(filter, darts, way)))
+/// Whether a way was driven only once: nothing has confirmed yet where it leads to.
+fn is_unconfirmed(darts: Darts<'_>, way: DartId) -> bool {
+    darts.partner(way).is_some() && darts.passages(way) < CONFIRMED_PASSAGES
+}
+
+/// The travel time from each vertex to the nearest one with a way that `is_due`.
+fn frames_to_way<const V: usize>(darts: Darts<'_>, is_due: impl Fn(DartId) -> bool) -> PerVertex<Option<u32>, V> {
+    frames_to(darts, |vertex| darts.ways(vertex).any(&is_due))
 }
 
 /// Whether the best map has a path from the robot's vertex to another one.

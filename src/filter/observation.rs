@@ -1,8 +1,8 @@
 //! An observation: the fingerprint of a place, and hints that need no odometry.
 
 use super::ways::{Exit, Ways};
-use crate::bearing::{HALF_TURN_MRAD, counter_clockwise_mrad, rotated};
-use crate::place::{Fingerprint, Obstacles, Openings};
+use crate::bearing::{counter_clockwise_mrad, rotated};
+use crate::place::{Fingerprint, Obstacles, Place};
 use crate::top_k::TopK;
 
 /// The way by which the robot came is the opening within this angle of where it is expected, in milliradians.
@@ -16,7 +16,7 @@ pub struct Passage {
     /// The number of ring frames since it left that place, 1 or more.
     pub travel_frames: Option<u16>,
     /// The bearing in the ring's geometry of the way by which it came to this place, in milliradians. `None` without a drive; the
-    /// way is then searched straight behind.
+    /// way is then searched at [`Place::behind_mrad`].
     pub entry_mrad: Option<i16>,
 }
 
@@ -24,12 +24,15 @@ impl Passage {
     /// Nothing is known.
     pub const UNKNOWN: Self = Self { exit: None, travel_frames: None, entry_mrad: None };
 
-    /// The openings of a place as ways; `None` if there are none. `rotation_mrad` is the change of all bearings since the frame
-    /// that the passage was taken from.
+    /// The ways of a place; `None` if no opening was seen. `rotation_mrad` is the change of all bearings since the frame that the
+    /// passage was taken from.
     ///
-    /// The robot came by the opening within 0.7 rad of `entry_mrad`. Without such an opening, it came by a way that was not seen.
-    pub fn ways(&self, openings: &Openings, rotation_mrad: i32) -> Option<Ways> {
-        let expected_mrad = rotated(self.entry_mrad.unwrap_or(HALF_TURN_MRAD), rotation_mrad);
+    /// The robot came by the opening within 0.7 rad of `entry_mrad`, or of [`Place::behind_mrad`] if that is unknown. Without such
+    /// an opening, it came by a way that was not seen.
+    pub fn ways(&self, place: &Place, rotation_mrad: i32) -> Option<Ways> {
+        let openings = &place.ways;
+        let entry_mrad = self.entry_mrad.map(|entry_mrad| rotated(entry_mrad, rotation_mrad));
+        let expected_mrad = entry_mrad.unwrap_or(place.behind_mrad);
         let entry_mrad = openings.nearest(expected_mrad, ENTRY_MRAD).map_or(expected_mrad, |(_, seen_mrad)| seen_mrad);
         let mut others_mrad = TopK::<u16, { Obstacles::MAX }>::new(0);
         for &opening_mrad in openings.bearings_mrad().iter().filter(|&&opening_mrad| opening_mrad != entry_mrad) {

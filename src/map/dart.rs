@@ -75,7 +75,7 @@ impl<'a> Darts<'a> {
         self.dart(dart).and_then(|dart| VertexId::new(dart.vertex))
     }
 
-    /// The other end of the edge of a dart; `None` for a frontier, a way that nobody has driven.
+    /// The other end of the edge of a dart; `None` for a frontier, a way that was not driven.
     pub fn partner(self, dart: DartId) -> Option<DartId> {
         self.dart(dart).and_then(|dart| DartId::new(dart.partner))
     }

@@ -1,7 +1,7 @@
 //! The edge-ordered map: at each vertex the ways in counter-clockwise order, and which two of them an edge joins.
 //!
 //! One way of one vertex is a *dart*. The partner of a dart is the other end of its edge; a dart without partner is a
-//! *frontier*, a way that nobody has driven.
+//! *frontier*, a way that was not driven.
 
 use super::dart::Darts;
 

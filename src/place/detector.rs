@@ -5,7 +5,7 @@ use super::rotation::RotationEstimate;
 use super::scan::{MeetPoint, RingScan};
 use super::smoothing::{DEAD_MM, RangeSmoother, SILENT_MM, bridge_dead_sensors};
 use super::{Fingerprint, PlaceConfig};
-use crate::bearing::{rotated, turn_mrad};
+use crate::bearing::{HALF_TURN_MRAD, rotated, turn_mrad};
 use crate::config_error::ConfigError;
 use crate::fault::{FaultCounters, FaultKind};
 use crate::ring::{Echo, RingFrame, RingGeometry};
@@ -31,6 +31,9 @@ pub struct Place {
     /// The bearings of the openings that at least half of the averaged frames show, in the frame in which the place is
     /// reported. `degree` may be another number: it needs the agreement of more frames.
     pub ways: Openings,
+    /// The direction from which the robot came: where straight behind was in the first frame that showed the meet point, as a
+    /// bearing in the frame in which the place is reported.
+    pub behind_mrad: i16,
     /// Smallest spread of the meet point's frames, in millimetres: 0 is an ideal meet point.
     pub spread_mm: u16,
 }
@@ -80,6 +83,8 @@ pub struct PlaceDetector<const SONARS: usize> {
     is_at_place: bool,
     /// Frames that showed the current meet point.
     sightings: u8,
+    /// `turned_mrad` in the first of them.
+    first_turned_mrad: i16,
     /// Frames that contradict the present state minus frames that confirm it, at least 0.
     contrary_frames: u8,
     /// The sightings with the smallest spread, best first.
@@ -103,6 +108,7 @@ impl<const SONARS: usize> PlaceDetector<SONARS> {
             turned_mrad: 0,
             is_at_place: false,
             sightings: 0,
+            first_turned_mrad: 0,
             contrary_frames: 0,
             best: [Sighting::UNSET; AVERAGED_FRAMES],
             faults: FaultCounters::new(),
@@ -258,6 +264,9 @@ impl<const SONARS: usize> PlaceDetector<SONARS> {
     /// Between places: collects the frames that show a meet point, and returns the place when it is complete.
     fn confirm(&mut self, sighting: Sighting) -> Option<Place> {
         if sighting.meet_point.spread_mm <= self.config.equidistance_mm {
+            if self.sightings == 0 {
+                self.first_turned_mrad = self.turned_mrad;
+            }
             self.sightings = self.sightings.saturating_add(1);
             self.contrary_frames = self.contrary_frames.saturating_sub(1);
             self.insert(sighting);
@@ -316,8 +325,9 @@ impl<const SONARS: usize> PlaceDetector<SONARS> {
         close.for_each(|sighting| {
             ways.add(&sighting.meet_point.openings, turn_mrad(sighting.turned_mrad, self.turned_mrad));
         });
+        let behind_mrad = rotated(HALF_TURN_MRAD, turn_mrad(self.first_turned_mrad, self.turned_mrad));
         let (frame_index, spread_mm) = (best.frame_index, best.meet_point.spread_mm);
-        Some(Place { fingerprint, frame_index, degree, ways: ways.agreed(), spread_mm })
+        Some(Place { fingerprint, frame_index, degree, ways: ways.agreed(), behind_mrad, spread_mm })
     }
 }
 

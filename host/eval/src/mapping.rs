@@ -20,19 +20,22 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
+use toposlam::persist::Persist;
 use toposlam::place::Place;
 use toposlam::reference::robust::{self, VERTICES};
 use toposlam::reference::{self, paper};
 use toposlam::ring::{RingFrame, RingGeometry};
-use toposlam::{ConfigError, FaultCounters, Filter, Map, Mapper, MapperConfig, Passage, Update};
+use toposlam::{ConfigError, Darts, FaultCounters, Filter, Map, Mapper, MapperConfig, Passage, Update};
 
+use toposlam::wire::FilterSettings;
 use toposlam_sim::Step;
 use toposlam_sim::exploration::Exploration;
-use toposlam_sim::world::{Told, TrueMap};
+use toposlam_sim::world::{GroundTruth, Told, TrueMap};
 
 use crate::ancestry::Ancestry;
 use crate::graph::Graph;
 use crate::range_csv::{Ring, SONARS_MAX};
+use crate::rotation::RotationSystem;
 use crate::score::{MapScore, score_map};
 
 /// The filter of a mapping, with the settings of the reference robot.
@@ -142,7 +145,7 @@ impl<const SONARS: usize> Mapping<SONARS> {
     pub fn observe(&mut self, frame: &RingFrame<SONARS>, passage: Passage) -> Option<Step> {
         let (place, update) = self.stages.observe(frame, passage)?;
         let map = self.map();
-        let told = Told { passage, ways: passage.ways(&place.ways, 0) };
+        let told = Told { passage, ways: passage.ways(&place, 0) };
         let step = Step { place, told, update, vertices: map.vertices().len() as u8, edges: map.edges().count() };
         self.steps.push(step);
         Some(step)
@@ -202,10 +205,30 @@ pub fn score_path<const V: usize>(
     score_map(&map, &path, &truth, &classes)
 }
 
-/// Scores the best map of a robot.
-pub fn score_exploration(exploration: &Exploration<'_>) -> MapScore {
-    let map = exploration.robot().mapper().map();
-    score_path(map, &exploration.path(), exploration.rover().true_map(), exploration.nodes())
+/// Scores the best map of a robot. A map with ways is exact if it has the driven edges in the order of the ways of the true map,
+/// parallel edges and loops included, up to a symmetry of the building.
+pub fn score_exploration<const V: usize, F>(exploration: &Exploration<'_, V, F>) -> MapScore
+where
+    F: Filter<V, Config: FilterSettings> + Persist,
+{
+    let mapper = exploration.robot().mapper();
+    let truth = exploration.rover().true_map();
+    let score = score_path(mapper.map(), &exploration.path(), truth, exploration.nodes());
+    let Some(darts) = mapper.filter().darts() else { return score };
+    let exact = has_driven_ways(darts, exploration.ground_truth());
+    MapScore { exact, isomorphic: exact, ..score }
+}
+
+/// Whether a map has the driven edges, in the order of the ways of the true map and up to a symmetry of the building. Frontiers do
+/// not count.
+pub fn has_driven_ways(darts: Darts<'_>, ground_truth: &GroundTruth) -> bool {
+    let truth = ground_truth.true_map();
+    let mut is_driven = vec![false; truth.edges.len()];
+    ground_truth.driven().into_iter().flatten().for_each(|(edge, _)| is_driven[edge] = true);
+    let is_visited = |node: &usize| truth.ways(*node).iter().any(|way| is_driven[way.edge]);
+    let visited: Vec<usize> = (0..truth.nodes.len()).filter(is_visited).collect();
+    let driven = RotationSystem::from(truth).part(&visited, |edge| is_driven[edge]);
+    RotationSystem::from(darts).is_isomorphic_to(&driven)
 }
 
 fn started<const SONARS: usize, F: Filter<VERTICES>>(

@@ -2,6 +2,7 @@
 
 use std::collections::{BTreeMap, VecDeque};
 use toposlam::Darts;
+use toposlam_sim::world::TrueMap;
 
 /// The ways of each vertex in counter-clockwise order.
 ///
@@ -97,6 +98,14 @@ impl RotationSystem {
         Self::new(vertices.iter().map(|&vertex| self.ways[vertex].iter().filter_map(renumbered).collect()).collect())
     }
 
+    /// Whether a connected system equals another one up to the numbers of vertices and darts: the same edges, and the same cyclic
+    /// order of the ways at every vertex.
+    pub fn is_isomorphic_to(&self, other: &Self) -> bool {
+        self.vertex_count() == other.vertex_count()
+            && self.dart_count() == other.dart_count()
+            && (self.dart_count() == 0 || (0..other.dart_count()).any(|way| self.follows(other, None, 0, way)))
+    }
+
     /// Whether a connected system equals another one up to the numbers of the darts, when vertex `v` of this one is vertex
     /// `image[v]` of the other: the same edges, and the same cyclic order of the ways at every vertex.
     pub fn equals(&self, other: &Self, image: &[usize]) -> bool {
@@ -106,11 +115,12 @@ impl RotationSystem {
         // One pair of darts determines all others.
         let Some(root) = (self.dart_count() > 0).then_some(0) else { return true };
         let candidates = image.get(self.vertex(root)).and_then(|&vertex| other.ways.get(vertex));
-        candidates.is_some_and(|ways| ways.iter().any(|&way| self.follows(other, image, root, way)))
+        candidates.is_some_and(|ways| ways.iter().any(|&way| self.follows(other, Some(image), root, way)))
     }
 
-    /// Whether the systems are equal with dart `root` of this one as dart `way` of the other.
-    fn follows(&self, other: &Self, image: &[usize], root: usize, way: usize) -> bool {
+    /// Whether the systems are equal with dart `root` of this one as dart `way` of the other, and with the images of the vertices
+    /// if they are given.
+    fn follows(&self, other: &Self, image: Option<&[usize]>, root: usize, way: usize) -> bool {
         let mut dart_of = vec![None; self.dart_count()];
         let mut is_taken = vec![false; other.dart_count()];
         let mut open = VecDeque::from([(root, way)]);
@@ -121,7 +131,8 @@ impl RotationSystem {
                 None => {}
             }
             let (here, there) = (self.vertex(dart), other.vertex(way));
-            if is_taken[way] || image[here] != there || self.ways[here].len() != other.ways[there].len() {
+            let is_image = image.is_none_or(|image| image[here] == there);
+            if is_taken[way] || !is_image || self.ways[here].len() != other.ways[there].len() {
                 return false;
             }
             dart_of[dart] = Some(way);
@@ -129,6 +140,14 @@ impl RotationSystem {
             open.extend([(partner(dart), partner(way)), (self.next_way(dart), other.next_way(way))]);
         }
         dart_of.iter().all(Option::is_some)
+    }
+}
+
+/// The true map of a building. Edge `e` has the darts `2 e` at its first node and `2 e + 1` at its second.
+impl From<&TrueMap> for RotationSystem {
+    fn from(map: &TrueMap) -> Self {
+        let darts = |node| map.ways(node).iter().map(|way| 2 * way.edge + usize::from(way.is_reversed)).collect();
+        Self::new((0..map.nodes.len()).map(darts).collect())
     }
 }
 
@@ -148,6 +167,25 @@ impl From<Darts<'_>> for RotationSystem {
 mod tests {
     use super::*;
     use rand::seq::SliceRandom;
+    use toposlam_sim::world::Plan;
+
+    #[test]
+    fn isomorphic_systems_differ_in_their_numbers_only() {
+        let system = |ways: &[&[usize]]| RotationSystem::new(ways.iter().map(|ways| ways.to_vec()).collect());
+        // A junction with a loop and two corridors of different ends: the loop is beside itself, or around one of the ends.
+        let beside = system(&[&[0, 1, 2, 4], &[3, 6], &[7], &[5]]);
+        let around = system(&[&[0, 2, 1, 4], &[3, 6], &[7], &[5]]);
+        assert!(!beside.is_isomorphic_to(&around));
+        assert!(beside.is_isomorphic_to(&system(&[&[4], &[5, 2], &[3, 0, 6, 7], &[1]])));
+    }
+
+    #[test]
+    fn a_building_is_isomorphic_to_itself_only() {
+        let system = |name| RotationSystem::from(&TrueMap::of(&Plan::built_in(name).unwrap()).unwrap());
+        let (office, ring) = (system("office"), system("ring"));
+        assert!(office.is_isomorphic_to(&office) && !office.is_isomorphic_to(&ring));
+        assert_eq!((office.genus(), ring.genus()), (0, 0));
+    }
 
     /// Two vertices, two parallel edges, a loop at vertex 0 and a dead end at vertex 1.
     fn small() -> RotationSystem {

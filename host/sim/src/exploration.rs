@@ -176,7 +176,7 @@ where
             self.note(&Place { frame_index, ..*place });
             let map = self.robot.mapper().map();
             let (vertices, edges) = (map.vertices().len() as u8, map.edges().count());
-            let ways = passage.ways(&place.ways, self.robot.mapper().detector().rotation_mrad());
+            let ways = passage.ways(place, self.robot.mapper().detector().rotation_mrad());
             self.steps.push(Step { place: *place, told: Told { passage, ways }, update: *update, vertices, edges });
         }
         seen

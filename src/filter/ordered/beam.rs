@@ -1,6 +1,7 @@
 //! The distinct hypotheses, ranked: growing them by one place, and taking in one that a move made.
 
-use super::hypothesis::{Choice, Gain, Hypothesis, Target};
+use super::choice::{Choice, Gain, Target};
+use super::hypothesis::Hypothesis;
 use super::model::Model;
 use super::record::Record;
 use crate::map::darts::NONE;
@@ -28,7 +29,7 @@ const EMPTY: Candidate = Candidate {
     choice: Choice { exit: NONE, target: Target::Known },
 };
 
-/// Up to `N` hypotheses of which no two have the same map and place.
+/// Up to `N` hypotheses. No two have the same map and the same place.
 #[derive(Clone, Debug)]
 pub(crate) struct Beam<const N: usize, const V: usize, const D: usize, const T: usize> {
     slots: [Hypothesis<V, D, T>; N],
@@ -227,7 +228,7 @@ impl<const N: usize, const V: usize, const D: usize, const T: usize> Beam<N, V, 
     }
 
     /// Takes in a hypothesis: in place of the one with the same map and place if it is better than that, else in a free
-    /// slot, else in place of the worst. Tells whether it was taken.
+    /// slot, else in place of the worst. Returns whether it was taken.
     pub(super) fn insert(&mut self, hypothesis: &Hypothesis<V, D, T>) -> bool {
         let key = hypothesis.key();
         let rank = self.iter().position(|held| held.key() == key);

@@ -1,12 +1,11 @@
 //! One hypothesis: an edge-ordered map, the way the robot came by, and what was counted on the way there.
 
+use super::choice::{Choice, Closures, Gain, OFF_MAP, ReportedExit, Target, UNSEEN};
 use super::label::Label;
 use super::model::{LN_WAYS, Model, SAME_WAY};
 use super::record::{Entry, Record};
 use crate::filter::Exit;
 use crate::map::darts::{Bearing, DartMap, NONE, WAYS};
-use crate::map::faces::DartSet;
-use crate::map::{VertexId, VertexSet};
 
 /// Labels that are this many standard deviations off are not looked at.
 const FAR: f32 = 5.0;
@@ -14,97 +13,8 @@ const FAR: f32 = 5.0;
 /// The log likelihood of a place that is not on the map, in nats.
 pub(super) const LN_OFF_MAP: f32 = -20.0;
 
-/// In a path: a place that is not on the map.
-pub(crate) const OFF_MAP: u8 = 254;
-
-/// As an exit: a way that no visit has shown.
-pub(super) const UNSEEN: u8 = 253;
-
 /// The largest number of darts of a hypothesis.
 pub(super) const DARTS_MAX: usize = 253;
-
-/// Where the robot got to from the place before.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Target {
-    /// The other end of the edge it took.
-    Known,
-    /// A new vertex, by its first way.
-    New,
-    /// This way of a vertex that is on the map.
-    At(u8),
-    /// A place that has no vertex on the map, and for which the map has no room.
-    OffMap,
-}
-
-/// One way to explain the newest place: the way by which the robot left, [`NONE`] at the first place of a sequence and [`UNSEEN`] for
-/// a way that no visit has shown, and where it got to.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) struct Choice {
-    pub(super) exit: u8,
-    pub(super) target: Target,
-}
-
-/// What the robot reported of the exit by which it left a place.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum ReportedExit {
-    Unknown,
-    /// This way.
-    Way(u8),
-    /// A way that no visit has shown.
-    Unseen,
-    /// Any but this one, by which it came.
-    NotBack(u8),
-}
-
-impl ReportedExit {
-    /// ln P of leaving by one of `ways` ways, and of the report: each way is as likely as another.
-    pub(super) fn ln(self, model: &Model, exit: u8, ways: usize) -> f32 {
-        let report = match self {
-            Self::Unknown => 0.0,
-            Self::Way(way) if way == exit => model.right_exit,
-            Self::Unseen if exit == UNSEEN => model.right_exit,
-            Self::Way(_) | Self::Unseen => model.ln_wrong_exit(ways.saturating_sub(1)),
-            Self::NotBack(came_by) if came_by != exit => model.right_exit,
-            Self::NotBack(_) => model.ln_wrong_exit(1),
-        };
-        report - model.ln_of(ways)
-    }
-}
-
-/// What an edge from one frontier to another does to the map.
-#[derive(Clone, Copy)]
-struct Closures {
-    /// The darts in the face of the first frontier.
-    face: DartSet,
-    /// The vertices that edges connect with it.
-    connected: VertexSet,
-    /// How many frontiers the map has.
-    frontiers: u8,
-}
-
-impl Closures {
-    const NONE: Self = Self { face: DartSet::EMPTY, connected: VertexSet::EMPTY, frontiers: 0 };
-
-    /// Whether an edge to a frontier leaves the genus as it is.
-    fn keep_genus(&self, exit: u8, frontier: u8, vertex: u8) -> bool {
-        exit == UNSEEN
-            || self.face.contains(frontier)
-            || VertexId::new(vertex).is_none_or(|vertex| !self.connected.contains(vertex))
-    }
-}
-
-/// What a choice gains: the logarithms of the labels' evidence and of all else.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub(super) struct Gain {
-    pub(super) labels: f32,
-    pub(super) rest: f32,
-}
-
-impl Gain {
-    pub(super) fn total(self) -> f32 {
-        self.labels + self.rest
-    }
-}
 
 #[derive(Clone, Debug)]
 pub(crate) struct Hypothesis<const V: usize, const D: usize, const T: usize> {
@@ -185,7 +95,7 @@ impl<const V: usize, const D: usize, const T: usize> Hypothesis<V, D, T> {
         }
     }
 
-    /// Whether a label is so far off that a vertex is out of the question.
+    /// Whether a label is too far off for a vertex.
     pub(super) fn is_far(&self, model: &Model, steps: u16, vertex: u8) -> bool {
         self.is_label_far(model, f32::from(steps), vertex)
     }

@@ -1,6 +1,7 @@
 //! Localisation on a map that does not change, and the start with a known map.
 
-use super::hypothesis::{Choice, Gain, Hypothesis, LN_OFF_MAP, OFF_MAP, Target};
+use super::choice::{Choice, Gain, OFF_MAP, Target};
+use super::hypothesis::{Hypothesis, LN_OFF_MAP};
 use super::label::Label;
 use super::model::Model;
 use super::record::Record;
@@ -11,7 +12,7 @@ use crate::map::Map;
 use crate::map::darts::DartMap;
 use crate::place::Fingerprint;
 
-/// The log prior of a kidnapping that nobody reported, in nats.
+/// The log prior of a kidnapping that was not reported, in nats.
 const LN_KIDNAPPED: f32 = -8.0;
 
 impl<const N: usize, const V: usize, const D: usize, const T: usize> OrderedFilter<N, V, D, T> {

@@ -5,8 +5,10 @@
 //! again from the newest observations with one closure undone, or with two vertices folded onto each other.
 
 mod beam;
+mod choice;
 mod config;
 mod fold;
+mod history;
 mod hypothesis;
 mod label;
 mod localise;
@@ -26,8 +28,7 @@ pub use config::OrderedConfig;
 
 #[cfg(feature = "snapshot")]
 pub(crate) use {
-    hypothesis::{Hypothesis as OrderedHypothesis, OFF_MAP},
-    label::Label as OrderedLabel,
+    choice::OFF_MAP, hypothesis::Hypothesis as OrderedHypothesis, label::Label as OrderedLabel,
     record::Entry as OrderedEntry,
 };
 
@@ -44,9 +45,6 @@ use model::{Model, SAME_WAY};
 use record::{Entry, Record};
 pub(crate) use repair::Repair;
 use translation::Translation;
-
-/// A way that was seen at fewer than one of this many visits may be none.
-const DOUBTFUL_LOOKS: u16 = 6;
 
 /// The noise is estimated at every fifth place from here on.
 const NOISE_FROM: u32 = 10;
@@ -174,54 +172,6 @@ impl<const N: usize, const V: usize, const D: usize, const T: usize> OrderedFilt
             }
         }
         observation
-    }
-
-    /// Drops the oldest quarter of the record. The best hypothesis decides what it meant; its counts stay, as the base of all
-    /// hypotheses from now on. Cost: as a refinement of all places.
-    fn drop_oldest(&mut self) {
-        self.repair_nothing();
-        let (len, dropped) = (self.record.len(), (self.record.len() / 4).max(1));
-        if let Some(best) = self.beam.get(0) {
-            self.source.clone_from(best);
-        }
-        let forgotten = self.base.rest;
-        let before = self.rebuild(0, dropped);
-        self.draft.fade(&self.model);
-        self.remove_doubtful_ways();
-        self.base.clone_from(&self.draft);
-        self.base.rest = 0.0;
-        if before.is_some() && self.rebuild(dropped, len).is_some() {
-            self.draft.rest -= forgotten;
-            self.draft.forget_oldest(dropped);
-            self.record.drop_oldest(dropped);
-            self.path.copy_within(dropped.min(T).., 0);
-        } else {
-            self.forget_record();
-        }
-        self.beam.start_with(&self.draft);
-    }
-
-    /// Removes ways from the draft that few visits have shown and nobody has driven, so that the table of darts does not fill with
-    /// errors of the detector.
-    fn remove_doubtful_ways(&mut self) {
-        let (source, translation) = (&self.source, &self.translation);
-        let is_doubtful = |dart: u8| {
-            let looks = source.label(source.map.vertex(dart)).looks;
-            source.map.partner(dart).is_none() && u16::from(source.map.seen(dart)) * DOUBTFUL_LOOKS < u16::from(looks)
-        };
-        let numbers = self.draft.map.remove_frontiers(|image| translation.preimage(image).is_some_and(is_doubtful));
-        self.translation.renumber(&numbers);
-        self.draft.at = numbers.get(usize::from(self.draft.at)).copied().unwrap_or(self.draft.at);
-        self.draft.rekey();
-    }
-
-    /// Makes the source the draft and the base, for a map that contradicts its own path: it stays as it is, and nothing of it can be
-    /// explained in another way.
-    fn forget_record(&mut self) {
-        self.base.clone_from(&self.source);
-        self.base.rest = 0.0;
-        self.draft.clone_from(&self.base);
-        self.record.clear();
     }
 
     fn estimate_noise(&mut self) {

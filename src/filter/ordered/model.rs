@@ -73,8 +73,8 @@ pub(crate) struct Model {
     wrong_exit: [f32; 8],
     missed: f32,
     false_way: f32,
-    /// What a visit that is explained rightly gains, by the number of ways seen.
-    par: [f32; 8],
+    /// The typical gain of a visit that is explained correctly, by the number of ways seen.
+    typical: [f32; 8],
 }
 
 /// −ln of the density of a bearing of a way that was not seen before: uniform over the circle.
@@ -98,7 +98,7 @@ impl Model {
             wrong_exit: [0.0; 8],
             missed: 0.0,
             false_way: 0.0,
-            par: [0.0; 8],
+            typical: [0.0; 8],
         }
     }
 
@@ -135,8 +135,8 @@ impl Model {
         self.labels.set_noise(noise_steps);
         let label = -0.5 * libm::logf(2.0 * core::f32::consts::PI * 1.3 * noise_steps * noise_steps) - 0.5;
         let way = self.bearings.ln(3, 0.0) - 0.5 - self.missed_share * 3.0 - 0.1;
-        for (ways, par) in self.par.iter_mut().enumerate() {
-            *par = label + way * ways.saturating_sub(1) as f32 + self.right_exit;
+        for (ways, typical) in self.typical.iter_mut().enumerate() {
+            *typical = label + way * ways.saturating_sub(1) as f32 + self.right_exit;
         }
     }
 
@@ -145,7 +145,7 @@ impl Model {
         self.wrong_exit.get(others).copied().unwrap_or(-9.0)
     }
 
-    /// ln P that an edge joins a given one of so many frontiers to another one.
+    /// ln P that an edge joins a given frontier to one of the frontiers of the map.
     pub(super) fn closure(&self, frontiers: usize, keeps_genus: bool) -> f32 {
         -self.ln_of(frontiers) - if keeps_genus { 0.0 } else { GENUS }
     }
@@ -234,9 +234,9 @@ impl Model {
         }
     }
 
-    /// What a visit that is explained rightly gains, about.
-    pub(super) fn par(&self, ways: u8, has_travel: bool) -> f32 {
+    /// The typical gain of a visit that is explained correctly.
+    pub(super) fn typical_gain(&self, ways: u8, has_travel: bool) -> f32 {
         let travel = if has_travel { self.travels.ln(2, 0.0) - 0.5 } else { 0.0 };
-        self.par.get(usize::from(ways)).copied().unwrap_or(0.0) + travel
+        self.typical.get(usize::from(ways)).copied().unwrap_or(0.0) + travel
     }
 }

@@ -1,7 +1,8 @@
 //! What the filter publishes after a place: the best map with its vertex ids, the robot's place, and probabilities.
 
 use super::OrderedFilter;
-use super::hypothesis::{Hypothesis, UNSEEN};
+use super::choice::UNSEEN;
+use super::hypothesis::Hypothesis;
 use crate::filter::worst_ngram::worst_ngram;
 use crate::filter::{OrderedFactors, Update, WeightFactors};
 use crate::map::darts::NONE;

@@ -2,12 +2,13 @@
 //!
 //! A repair starts from one of the hypotheses, its source, and builds a draft from the record. The draft follows the path of the
 //! source until it has to leave it: at a decision that is forbidden, at a place from which on all is decided again, or where the
-//! source, two vertices of which were folded onto each other, contradicts itself. From there on decisions look ahead, until the
+//! source contradicts itself because two of its vertices were folded onto each other. From there on decisions look ahead, until the
 //! draft is where the source is. A draft that is better than the worst hypothesis becomes one.
 
 use super::OrderedFilter;
+use super::choice::{ReportedExit, UNSEEN};
 use super::fold::{fit, fold};
-use super::hypothesis::{Hypothesis, ReportedExit, UNSEEN};
+use super::hypothesis::Hypothesis;
 use super::logarithm::ln;
 use super::replay::Builder;
 use crate::filter::draws;
@@ -27,21 +28,21 @@ const WORK: u32 = 300;
 /// The work of one decision.
 const DECISION: u32 = 12;
 
-/// Of 16 repairs so many start from the best hypothesis in any case, so many fold two vertices, and of the others so many decide
-/// all again.
+/// Of 16 repairs, how many start from the best hypothesis in any case, and how many fold two vertices; of 16 others, how many decide
+/// everything again.
 const BEST: usize = 4;
 const FOLDED: usize = 6;
 const RESTARTS: usize = 2;
-/// And so many start elsewhere on the map.
+/// And how many relocate the robot.
 const RELOCATED: usize = 4;
-/// Of the others so many forbid an edge that contradicts a reported exit.
+/// Of 16 others, how many forbid an edge that contradicts a reported exit.
 const DOUBTED: usize = 6;
 
-/// Of 16 repairs that forbid a decision so many decide all that follows again.
+/// Of 16 repairs that forbid a decision, how many decide everything after it again.
 const FREE: usize = 6;
 
-/// A repair starts from the draft of the one before if that lost no more than this compared with the best hypothesis, in nats, so
-/// many times in sequence.
+/// A repair starts from the draft of the one before if that is no more than this below the best hypothesis, in nats; and how often
+/// that happens in sequence.
 const CHAIN_LOSS: f32 = 25.0;
 const CHAIN_LENGTH: u8 = 2;
 
@@ -53,7 +54,7 @@ const FOLD_TEMPERATURE: f32 = 3.0;
 
 /// Where a repair leaves the path of its source.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Stray {
+enum Deviation {
     /// Only where the source contradicts itself.
     Never,
     /// At the decision with this number.
@@ -69,7 +70,7 @@ enum Stray {
 pub(crate) struct Repair {
     /// The next observation; `None` when no repair is under way.
     next: Option<usize>,
-    stray: Stray,
+    deviation: Deviation,
     /// Whether the draft is where the source is.
     follows: bool,
     /// Noise of the decisions.
@@ -79,7 +80,8 @@ pub(crate) struct Repair {
 }
 
 impl Repair {
-    pub(crate) const NONE: Self = Self { next: None, stray: Stray::Never, follows: false, temperature: 0.0, chained: 0 };
+    pub(crate) const NONE: Self =
+        Self { next: None, deviation: Deviation::Never, follows: false, temperature: 0.0, chained: 0 };
 }
 
 impl<const N: usize, const V: usize, const D: usize, const T: usize> OrderedFilter<N, V, D, T> {
@@ -106,13 +108,13 @@ impl<const N: usize, const V: usize, const D: usize, const T: usize> OrderedFilt
             } else {
                 // A change that loses little may be the first of two that gain.
                 let best = self.beam.get(0).map_or(0.0, Hypothesis::score);
-                let goes_on = self.draft.score() > best - CHAIN_LOSS && self.repair.chained < CHAIN_LENGTH;
-                self.repair.chained = if goes_on { self.repair.chained + 1 } else { 0 };
+                let continues = self.draft.score() > best - CHAIN_LOSS && self.repair.chained < CHAIN_LENGTH;
+                self.repair.chained = if continues { self.repair.chained + 1 } else { 0 };
             }
         }
     }
 
-    /// Chooses a source and where to leave its path; tells whether there is something to repair.
+    /// Chooses a source and where to leave its path. Returns whether there is something to repair.
     fn start_repair(&mut self, random: &mut Xoshiro128PlusPlus) -> bool {
         let rank = match self.repair.chained {
             0 if below(random, 16) < BEST => Some(0),
@@ -120,32 +122,32 @@ impl<const N: usize, const V: usize, const D: usize, const T: usize> OrderedFilt
             _ => None,
         };
         self.take_source(rank);
-        let stray = if below(random, 16) < FOLDED {
+        let deviation = if below(random, 16) < FOLDED {
             if !self.fold_two(random, rank) {
                 return false;
             }
-            Stray::Never
+            Deviation::Never
         } else if below(random, 16) < RELOCATED {
             let from = below(random, 2) * below(random, self.record.len());
             let builder = Builder { model: &self.model, record: &self.record, translation: &mut self.translation };
             if !builder.relocate(&mut self.source, from, || FOLD_TEMPERATURE * gumbel(random)) {
                 return false;
             }
-            Stray::Never
+            Deviation::Never
         } else if below(random, 16) < RESTARTS {
-            Stray::From(1)
+            Deviation::From(1)
         } else if below(random, 16) < DOUBTED
             && let Some(at) = self.doubted_edge(random)
         {
-            Stray::At(at)
+            Deviation::At(at)
         } else if below(random, 4) > 0 {
             // Some more than there are edges: exits that were doubted, and places that fit badly.
-            Stray::AtDecision(below(random, self.source.map.edges().count() + 3))
+            Deviation::AtDecision(below(random, self.source.map.edges().count() + 3))
         } else {
-            Stray::From(1 + below(random, self.record.len() - 1))
+            Deviation::From(1 + below(random, self.record.len() - 1))
         };
-        let temperature = if stray == Stray::Never { 0.0 } else { TEMPERATURE * uniform(random) };
-        self.repair = Repair { next: Some(0), stray, follows: true, temperature, chained: self.repair.chained };
+        let temperature = if deviation == Deviation::Never { 0.0 } else { TEMPERATURE * uniform(random) };
+        self.repair = Repair { next: Some(0), deviation, follows: true, temperature, chained: self.repair.chained };
         self.start_draft();
         true
     }
@@ -182,29 +184,31 @@ impl<const N: usize, const V: usize, const D: usize, const T: usize> OrderedFilt
         source.path.iter().take(self.record.len()).position(|&came_by| came_by == exit || came_by == partner)
     }
 
-    /// Builds on the draft; tells whether it explains the whole record.
+    /// Builds on the draft. Returns whether it explains the whole record.
     fn continue_repair(&mut self, random: &mut Xoshiro128PlusPlus) -> bool {
         let Some(mut index) = self.repair.next else { return false };
         let mut builder = Builder { model: &self.model, record: &self.record, translation: &mut self.translation };
         let mut work = 0;
         while index < self.record.len() && work < WORK {
             let mut forbidden = None;
-            if let Stray::From(from) = self.repair.stray {
+            if let Deviation::From(from) = self.repair.deviation {
                 self.repair.follows &= index < from;
             }
             if self.repair.follows
                 && let Some(step) = builder.step(&self.source, &mut self.draft, index)
             {
                 work += 1;
-                match &mut self.repair.stray {
-                    Stray::AtDecision(0) if step.is_decision => {
+                match &mut self.repair.deviation {
+                    Deviation::AtDecision(0) if step.is_decision => {
                         forbidden = Some(step.choice);
-                        self.repair.stray = if below(random, 16) < FREE { Stray::From(index) } else { Stray::Never };
+                        self.repair.deviation =
+                            if below(random, 16) < FREE { Deviation::From(index) } else { Deviation::Never };
                     }
-                    Stray::AtDecision(left) if step.is_decision => *left -= 1,
-                    Stray::At(at) if *at == index => {
+                    Deviation::AtDecision(left) if step.is_decision => *left -= 1,
+                    Deviation::At(at) if *at == index => {
                         forbidden = Some(step.choice);
-                        self.repair.stray = if below(random, 16) < FREE { Stray::From(index) } else { Stray::Never };
+                        self.repair.deviation =
+                            if below(random, 16) < FREE { Deviation::From(index) } else { Deviation::Never };
                     }
                     _ => {}
                 }
@@ -274,7 +278,7 @@ impl<const N: usize, const V: usize, const D: usize, const T: usize> OrderedFilt
         (from..until).try_for_each(|index| builder.follow(&self.source, &mut self.draft, index))
     }
 
-    /// Folds two vertices of the source, the hypothesis of a rank or the draft; tells whether there were two that fit.
+    /// Folds two vertices of the source, the hypothesis of a rank or the draft. Returns whether there were two that fit.
     ///
     /// Pairs are drawn by how well they fit, then one of them by what follows from it.
     fn fold_two(&mut self, random: &mut Xoshiro128PlusPlus, rank: Option<usize>) -> bool {

@@ -1,19 +1,20 @@
 //! Building a map again from the record: along a given path, or by decisions that look ahead.
 
-use super::hypothesis::{Choice, Gain, Hypothesis, OFF_MAP, ReportedExit, Target, UNSEEN};
+use super::choice::{Choice, Gain, OFF_MAP, ReportedExit, Target, UNSEEN};
+use super::hypothesis::Hypothesis;
 use super::model::Model;
 use super::record::Record;
 use super::translation::Translation;
 use crate::filter::Exit;
 use crate::map::darts::NONE;
 
-/// A visit that gains so much less than one that is explained rightly calls for a decision, in nats.
+/// A visit whose gain is below the typical one by more than this calls for a decision, in nats.
 const SURPRISE: f32 = -6.0;
 
 /// What one place of a rollout can cost at most: about what an explanation by a wrong exit costs, in nats.
 const ROLLOUT_WORST: f32 = -9.0;
 
-/// A place of a rollout that gains so much less calls for another exit than the one that was told, in nats.
+/// A place of a rollout whose gain is below the typical one by more than this calls for another exit than the reported one, in nats.
 const DOUBT: f32 = -4.0;
 
 /// Exits that cost more than this are not considered, in nats.
@@ -22,7 +23,7 @@ const WORST_EXIT: f32 = -8.0;
 /// How many places a rollout looks ahead.
 const LOOKAHEAD: usize = 10;
 
-/// What a rollout loses that ends at a way that nobody has driven, in nats: another decision is due there.
+/// What a rollout loses that ends at a frontier, in nats: it needs another decision.
 const OPEN: f32 = 3.0;
 
 /// How many choices are followed ahead.
@@ -71,9 +72,10 @@ impl<const V: usize, const D: usize, const T: usize> Builder<'_, V, D, T> {
             _ => to.reported_exit(self.record, index, to.at),
         };
         let gain = to.gain(self.model, &entry, reported, choice);
-        let par = self.model.par(entry.count(), entry.ln_travel > 0) + SURPRISE;
-        let is_expected =
-            choice.target == Target::Known && reported == ReportedExit::Way(choice.exit) && gain.total() > par - 1.0;
+        let typical = self.model.typical_gain(entry.count(), entry.ln_travel > 0) + SURPRISE;
+        let is_expected = choice.target == Target::Known
+            && reported == ReportedExit::Way(choice.exit)
+            && gain.total() > typical - 1.0;
         Some(Step { choice, gain, is_decision: !is_expected && index > 0 })
     }
 
@@ -132,7 +134,7 @@ impl<const V: usize, const D: usize, const T: usize> Builder<'_, V, D, T> {
         mut noise: impl FnMut() -> f32,
     ) -> Option<(Target, bool)> {
         let entry = self.record.get(index);
-        let par = self.model.par(entry.count(), entry.ln_travel > 0);
+        let typical = self.model.typical_gain(entry.count(), entry.ln_travel > 0);
         if to.is_on_map()
             && !entry.starts()
             && let reported @ ReportedExit::Way(exit) = to.reported_exit(self.record, index, to.at)
@@ -141,7 +143,7 @@ impl<const V: usize, const D: usize, const T: usize> Builder<'_, V, D, T> {
             let choice = Choice { exit, target: Target::Known };
             let gain = to.gain(self.model, &entry, reported, choice);
             let ways = self.model.ln_of(to.map.ways(to.map.vertex(to.at)).len());
-            if gain.total() > par + SURPRISE - ways && forbidden != Some(choice) {
+            if gain.total() > typical + SURPRISE - ways && forbidden != Some(choice) {
                 to.extend(&entry, index, choice, gain, 0);
                 return Some((choice.target, true));
             }
@@ -200,7 +202,7 @@ impl<const V: usize, const D: usize, const T: usize> Builder<'_, V, D, T> {
         }
     }
 
-    /// What the places after observation `index` gain, compared with what they gain when they are explained rightly, as far as
+    /// The gain of the places after observation `index`, compared with the typical one, as far as
     /// known ways lead.
     fn rollout(&self, on: &mut Hypothesis<V, D, T>, index: usize, choice: Choice) -> f32 {
         match choice.target {
@@ -222,8 +224,8 @@ impl<const V: usize, const D: usize, const T: usize> Builder<'_, V, D, T> {
 
     fn arrive(&self, on: &Hypothesis<V, D, T>, index: usize, at: u8) -> f32 {
         let entry = self.record.get(index);
-        let par = self.model.par(entry.count(), false);
-        (on.arrival(self.model, &entry, at).total() - par).max(ROLLOUT_WORST)
+        let typical = self.model.typical_gain(entry.count(), false);
+        (on.arrival(self.model, &entry, at).total() - typical).max(ROLLOUT_WORST)
     }
 
     fn follow_known(&self, on: &Hypothesis<V, D, T>, index: usize, mut at: u8) -> f32 {
@@ -244,14 +246,14 @@ impl<const V: usize, const D: usize, const T: usize> Builder<'_, V, D, T> {
     }
 
     /// Where the robot got to at observation `index` by a known way, having come to the place before by `at`, and what that gains
-    /// compared with a place that is explained rightly; [`NONE`] where nobody has driven.
+    /// compared with the typical gain; [`NONE`] at a frontier.
     fn known_step(&self, on: &Hypothesis<V, D, T>, index: usize, at: u8) -> (f32, u8) {
         let entry = self.record.get(index);
         let reported = on.reported_exit(self.record, index, at);
-        let par = self.model.par(entry.count(), entry.ln_travel > 0);
+        let typical = self.model.typical_gain(entry.count(), entry.ln_travel > 0);
         let gain = |partner: u8| {
             on.arrival(self.model, &entry, partner).total() + self.model.travel(on.map.travel(partner), entry.ln_travel)
-                - par
+                - typical
         };
         let mut best = (f32::NEG_INFINITY, NONE);
         if reported == ReportedExit::Unseen {

@@ -108,7 +108,7 @@ mod tests {
         Entry::new(&Observation { ways, ..Observation::new(Fingerprint::from_steps(500).unwrap()) })
     }
 
-    /// A vertex whose ways have bearings in radians and were seen so often.
+    /// A vertex with ways: their bearings in radians and how often each was seen.
     fn vertex(ways: &[(f64, u8)], looks: u8) -> Small {
         let mut hypothesis = Small::ZERO;
         let vertex = hypothesis.map.add_vertex().unwrap();

@@ -8,17 +8,17 @@ use clap::Args;
 use toposlam::persist::Persist;
 use toposlam::reference::SONARS;
 use toposlam::wire::{FilterSettings, map_digest};
-use toposlam::{FaultCounters, Filter, Map};
+use toposlam::{Darts, FaultCounters, Filter, Map};
 use toposlam_cli::picture::{Drawing, draw};
 use toposlam_eval::faults::fault_lines;
-use toposlam_eval::mapping::score_path;
+use toposlam_eval::mapping::{has_driven_ways, score_path};
 use toposlam_sim::exploration::Exploration;
 use toposlam_sim::world::{GroundTruth, Plan, RobotModel, TrueMap};
 
 /// The floor plan, the seed and the noise.
 #[derive(Args)]
 pub(super) struct DriveArguments {
-    /// Floor plan: ring, office, flat, or a text file (docs/driving.md).
+    /// Floor plan: ring, office, flat, grid, plus, comb, ladder, or a text file (docs/driving.md).
     #[arg(long, default_value = "office")]
     plan: String,
     /// Seed of the drive and of all noise.
@@ -69,18 +69,26 @@ impl DriveArguments {
 
     /// Prints the detected places and the scores of the map, and writes the SVG file if `--svg` is given.
     pub(super) fn summarise<const V: usize>(&self, drive: &Summary<'_, V>) -> anyhow::Result<()> {
-        let Summary { plan, truth, ground_truth, map, path, faults } = drive;
+        let Summary { plan, truth, ground_truth, map, darts, is_complete, path, faults } = drive;
         let detections = ground_truth.detections();
         println!("\n{}: {} places in {} visits", self.plan, detections.len(), ground_truth.visits());
         println!("{}", ground_truth.report());
         let nodes: Vec<Option<usize>> = detections.iter().map(|detection| detection.node).collect();
         let score = score_path(map, path, truth, &nodes);
+        let exact = darts.map(|darts| has_driven_ways(darts, ground_truth));
         let (vertices, edges) = (map.vertices().len(), map.edges().count());
-        println!("map: {vertices} vertices, {edges} edges, digest {:08x}", map_digest(map, None));
+        println!("map: {vertices} vertices, {edges} edges, digest {:08x}", map_digest(map, *darts));
+        if let Some(darts) = darts {
+            println!(
+                "ways that nobody has driven: {}, complete {}",
+                darts.frontiers().count(),
+                yes_or_no(*is_complete)
+            );
+        }
         println!(
             "against the true map: exact {}, isomorphic {}, edge F1 {:.2}, located in {:.0} % of the places",
-            yes_or_no(score.exact),
-            yes_or_no(score.isomorphic),
+            yes_or_no(exact.unwrap_or(score.exact)),
+            yes_or_no(exact.unwrap_or(score.isomorphic)),
             score.edge_f1,
             100.0 * score.location
         );
@@ -100,6 +108,10 @@ pub(super) struct Summary<'a, const V: usize> {
     pub(super) truth: &'a TrueMap,
     pub(super) ground_truth: &'a GroundTruth,
     pub(super) map: &'a Map<V>,
+    /// The ways of the map, if the filter knows them.
+    pub(super) darts: Option<Darts<'a>>,
+    /// Whether the drive holds the map for complete.
+    pub(super) is_complete: bool,
     pub(super) path: Vec<Option<usize>>,
     pub(super) faults: FaultCounters,
 }
@@ -115,6 +127,8 @@ impl<'a, const V: usize> Summary<'a, V> {
             truth: exploration.rover().true_map(),
             ground_truth: exploration.ground_truth(),
             map: exploration.robot().mapper().map(),
+            darts: exploration.robot().mapper().filter().darts(),
+            is_complete: exploration.robot().drive().is_complete(),
             path: exploration.path(),
             faults: exploration.faults(),
         }
@@ -131,7 +145,7 @@ pub(super) fn load_plan(name_or_file: &str) -> anyhow::Result<Plan> {
         return Ok(plan);
     }
     let text = std::fs::read_to_string(name_or_file).with_context(|| {
-        format!("{name_or_file:?} is neither a built-in floor plan (ring, office, flat) nor a readable file")
+        format!("{name_or_file:?} is neither a built-in floor plan (ring, office, flat, grid, plus, comb, ladder) nor a readable file")
     })?;
     Plan::parse(&text).with_context(|| format!("floor plan {name_or_file}"))
 }

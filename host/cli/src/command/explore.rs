@@ -2,9 +2,12 @@
 
 use anyhow::ensure;
 use clap::Args;
+use toposlam::Filter;
 use toposlam::drive::GoalStatus;
-use toposlam::reference::SNAPSHOT_BYTES;
-use toposlam::wire::Command;
+use toposlam::persist::Persist;
+use toposlam::reference::{SONARS, ordered, paper, robust};
+use toposlam::robot::RobotConfig;
+use toposlam::wire::{Command, FilterSettings};
 use toposlam_eval::mapping::score_exploration;
 use toposlam_eval::parallel;
 use toposlam_sim::exploration::Exploration;
@@ -12,6 +15,7 @@ use toposlam_sim::injector::FaultRates;
 use toposlam_sim::world::{HintReport, Plan, Report, RobotModel, Told};
 
 use super::drive::{fault_rate, load_plan, noise_factor, number_in};
+use super::filter::FilterArgument;
 
 /// Timeout of a goal, in ring frames.
 const FRAMES_PER_JOURNEY: u64 = 20_000;
@@ -19,7 +23,7 @@ const FRAMES_PER_JOURNEY: u64 = 20_000;
 /// Arguments of `toposlam explore`.
 #[derive(Args)]
 pub(crate) struct Arguments {
-    /// Floor plans: ring, office, flat, or files.
+    /// Floor plans: ring, office, flat, grid, plus, comb, ladder, or files.
     #[arg(long, value_name = "PLAN,...", value_delimiter = ',', default_value = "office,ring,flat")]
     plans: Vec<String>,
     /// Factors on every noise of the robot, 0 to 100.
@@ -31,6 +35,9 @@ pub(crate) struct Arguments {
     /// Places per exploration.
     #[arg(long, default_value_t = 300)]
     places: usize,
+    /// Filter that makes the map.
+    #[arg(long, value_enum, default_value_t = FilterArgument::Ordered)]
+    filter: FilterArgument,
     /// Goals after each exploration that ended with the exact map.
     #[arg(long, alias = "journeys", default_value_t = 5)]
     goals: u64,
@@ -54,6 +61,7 @@ struct Run {
     report: Report,
     hints: HintReport,
     exact: bool,
+    visited_all: bool,
     complete: bool,
     locations: f64,
     times_lost: u32,
@@ -76,13 +84,39 @@ struct Journeys {
 pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     ensure!(arguments.runs > 0, "--runs must be at least 1");
     println!(
-        "| Plan | Noise | Exact maps | Complete | Located | Found / missed / doubled / phantom | Radius error, median / 90 % \
+        "| Plan | Noise | Exact maps | Visited all | Complete | Located | Found / missed / doubled / phantom | Radius error, median / 90 % \
          | Degree seen / right | Way lost | Bumps | Frames per place | Goals reached / commanded / reached elsewhere |"
     );
-    println!("|---|---|---|---|---|---|---|---|---|---|---|---|");
+    println!("|---|---|---|---|---|---|---|---|---|---|---|---|---|");
     let mut rows = Vec::new();
     for name in &arguments.plans {
         let plan = load_plan(name)?;
+        let one = |arguments: &Arguments, plan: &Plan, noise: f64, seed: u64| match arguments.filter {
+            FilterArgument::Ordered => one::<{ ordered::VERTICES }, ordered::Filter>(
+                arguments,
+                plan,
+                noise,
+                seed,
+                &ordered::ROBOT,
+                &mut [0; ordered::SNAPSHOT_BYTES],
+            ),
+            FilterArgument::Robust => one::<{ robust::VERTICES }, robust::Filter>(
+                arguments,
+                plan,
+                noise,
+                seed,
+                &robust::ROBOT,
+                &mut [0; robust::SNAPSHOT_BYTES],
+            ),
+            FilterArgument::Paper => one::<{ paper::VERTICES }, paper::Filter>(
+                arguments,
+                plan,
+                noise,
+                seed,
+                &paper::ROBOT,
+                &mut [0; paper::SNAPSHOT_BYTES],
+            ),
+        };
         for &noise in &arguments.noises {
             let runs = parallel::map(arguments.runs, 0, |run| one(arguments, &plan, noise, run as u64 + 1))?;
             let runs: Result<Vec<Run>, _> = runs.into_iter().collect();
@@ -105,15 +139,24 @@ fn degrees(text: &str) -> Result<f64, String> {
     number_in(text, 0.0..=90.0)
 }
 
-fn one(arguments: &Arguments, plan: &Plan, noise: f64, seed: u64) -> anyhow::Result<Run> {
+fn one<const V: usize, F>(
+    arguments: &Arguments,
+    plan: &Plan,
+    noise: f64,
+    seed: u64,
+    config: &RobotConfig<SONARS, F::Config>,
+    buffer: &mut [u8],
+) -> anyhow::Result<Run>
+where
+    F: Filter<V, Config: FilterSettings> + Persist,
+{
     let mut model = RobotModel::default().with_noise(noise);
     model.sonar.dead_sonars = arguments.dead_sonars;
     model.sonar.missed_share = arguments.missed.unwrap_or(model.sonar.missed_share);
     if let Some(limit_deg) = arguments.specular_limit_deg {
         model.sonar.specular_limit_rad = limit_deg.to_radians();
     }
-    let mut buffer = [0; SNAPSHOT_BYTES];
-    let mut exploration = Exploration::start(plan, model, seed, &mut buffer)?;
+    let mut exploration = Exploration::<V, F>::with_robot(plan, model, seed, config, buffer)?;
     if arguments.faults > 0.0 {
         exploration.set_faults(FaultRates::scaled(arguments.faults), seed);
     }
@@ -128,21 +171,25 @@ fn one(arguments: &Arguments, plan: &Plan, noise: f64, seed: u64) -> anyhow::Res
         report: exploration.ground_truth().report(),
         hints: exploration.ground_truth().hint_report(&told),
         exact: score.exact,
-        complete: seen.len() == exploration.rover().true_map().nodes.len(),
+        complete: exploration.robot().drive().is_complete(),
+        visited_all: seen.len() == exploration.rover().true_map().nodes.len(),
         locations: score.location,
         times_lost: exploration.times_lost(),
         bumps: exploration.rover().bumps(),
         frames: exploration.frames(),
         journeys: Journeys::default(),
     };
-    if run.exact && run.complete {
+    if run.exact && run.visited_all {
         run.journeys = travel(&mut exploration, arguments.goals, seed);
     }
     Ok(run)
 }
 
 /// Commands the robot to vertices of its map over its line, and compares where it stops with the ground truth.
-fn travel(exploration: &mut Exploration<'_>, journeys: u64, seed: u64) -> Journeys {
+fn travel<const V: usize, F>(exploration: &mut Exploration<'_, V, F>, journeys: u64, seed: u64) -> Journeys
+where
+    F: Filter<V, Config: FilterSettings> + Persist,
+{
     let mut outcome = Journeys::default();
     for number in 0..journeys {
         let vertices = exploration.robot().mapper().map().vertices().len() as u64;
@@ -210,8 +257,9 @@ fn print_row(name: &str, noise: f64, runs: &[Run], places: usize) {
     let frames = runs.iter().map(|run| run.frames).sum::<u64>() / (runs.len() * places) as u64;
     let journeys = |of: fn(&Journeys) -> u64| runs.iter().map(|run| of(&run.journeys)).sum::<u64>();
     println!(
-        "| {name} | {noise} | {:.0} % | {:.0} % | {:.1} % | {} / {} / {} / {} | {:.0} / {:.0} mm | {} / {} | {} | {} | {frames} | {} / {} / {} |",
+        "| {name} | {noise} | {:.0} % | {:.0} % | {:.0} % | {:.1} % | {} / {} / {} / {} | {:.0} / {:.0} mm | {} / {} | {} | {} | {frames} | {} / {} / {} |",
         share(runs.iter().filter(|run| run.exact).count()),
+        share(runs.iter().filter(|run| run.visited_all).count()),
         share(runs.iter().filter(|run| run.complete).count()),
         100.0 * located,
         sum(|run| run.report.found),

@@ -106,6 +106,7 @@ pub(super) fn run(
                             frame_index,
                             degree,
                             ways: Openings::NONE,
+                            behind_mrad: 0,
                             spread_mm: 0,
                         });
                         bar.increment();

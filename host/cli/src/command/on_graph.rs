@@ -58,6 +58,8 @@ pub(super) fn run(drive: &DriveArguments, options: &OnGraph, places: usize, fram
         truth: simulation.true_map(),
         ground_truth: &ground_truth,
         map: mapping.map(),
+        darts: None,
+        is_complete: false,
         path: mapping.path(),
         faults: mapping.faults(),
     })

@@ -20,7 +20,7 @@ pub(crate) struct Arguments {
     /// Address to listen at, HOST:PORT; port 0 for any free port.
     #[arg(long, default_value = "127.0.0.1:7070")]
     listen: String,
-    /// Floor plan: ring, office, flat, or a text file (docs/driving.md).
+    /// Floor plan: ring, office, flat, grid, plus, comb, ladder, or a text file (docs/driving.md).
     #[arg(long, default_value = "office")]
     plan: String,
     /// Seed of the drive and of all noise.

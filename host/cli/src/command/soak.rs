@@ -11,7 +11,7 @@ use super::drive::{fault_rate, load_plan, noise_factor};
 /// Arguments of `toposlam soak`.
 #[derive(Args)]
 pub(crate) struct Arguments {
-    /// Floor plan: ring, office, flat, or a text file (docs/driving.md).
+    /// Floor plan: ring, office, flat, grid, plus, comb, ladder, or a text file (docs/driving.md).
     #[arg(long, default_value = "office")]
     plan: String,
     /// Seed of the world, of all noise and of the faults.

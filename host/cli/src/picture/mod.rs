@@ -197,8 +197,14 @@ mod tests {
     #[test]
     fn a_vertex_is_drawn_at_the_node_of_most_of_its_visits() {
         let fingerprint = Fingerprint::from_radius_mm(1000).unwrap();
-        let place =
-            Place { fingerprint, frame_index: 0, degree: None, ways: toposlam::place::Openings::NONE, spread_mm: 0 };
+        let place = Place {
+            fingerprint,
+            frame_index: 0,
+            degree: None,
+            ways: toposlam::place::Openings::NONE,
+            behind_mrad: 0,
+            spread_mm: 0,
+        };
         let visit = |x_mm, node| Detection { place, position: Point::new(x_mm, 0.0), node };
         let visits = [visit(100.0, Some(3)), visit(9000.0, Some(1)), visit(300.0, Some(3)), visit(5000.0, None)];
         assert_eq!(mostly_at(&visits), Point::new(200.0, 0.0));

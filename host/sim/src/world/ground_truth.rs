@@ -99,6 +99,11 @@ impl GroundTruth {
         detection
     }
 
+    /// The true map.
+    pub const fn true_map(&self) -> &TrueMap {
+        &self.map
+    }
+
     /// For each visit but the first the way by which the robot left the node before: its edge, and whether the edge was driven
     /// from its second node. `None` where it did not drive along an edge.
     pub fn driven(&self) -> Vec<Option<(usize, bool)>> {

@@ -5,11 +5,15 @@ use std::f64::consts::TAU;
 
 use toposlam::{Exit, Passage, Ways};
 
-use super::GroundTruth;
 use super::ray_casting::wrapped;
+use super::{GroundTruth, TrueWay};
 
-/// A bearing that was told belongs to the true way within this angle, in radians.
+/// A bearing that was told belongs to the way within this angle, in radians.
 const SAME_WAY_RAD: f64 = 0.55;
+/// The same while only the true bearings are known: those of the Voronoi graph, not those of the openings.
+const NEAR_WAY_RAD: f64 = 0.9;
+/// Rounds of the fit of the bearings.
+const FIT_ROUNDS: usize = 20;
 
 /// The hints of one detected place.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -45,7 +49,7 @@ pub struct HintReport {
     /// Number of true ways, other than the one the robot came by, at places whose ways were told; of those that were missed; and
     /// of ways that were told and do not exist.
     pub ways: (usize, usize, usize),
-    /// Told minus true bearing of each way that was found, in radians.
+    /// Told bearing of each way that was found minus its mean over all places at the node, in radians.
     pub bearing_errors_rad: Vec<f64>,
     /// ln of each travel time minus the mean of its edge. Edges with one passage do not count.
     pub travel_errors: Vec<f64>,
@@ -75,6 +79,8 @@ impl GroundTruth {
         let driven = self.driven();
         let visits = self.visits_of_places();
         let mut travels: BTreeMap<(usize, bool), Vec<f64>> = BTreeMap::new();
+        let mut sightings: BTreeMap<usize, Vec<Sighting>> = BTreeMap::new();
+        let mut exits = Vec::new();
         for (place, told) in told.iter().enumerate().skip(1) {
             let (Some(Some(before)), Some(Some(now))) = (visits.get(place - 1), visits.get(place)) else { continue };
             if *now != before + 1 {
@@ -91,7 +97,8 @@ impl GroundTruth {
                 report.places.0 += 1;
                 let others = ways.others().unwrap_or(&[]).iter();
                 let seen: Vec<f64> = others.map(|&other| f64::from(other) / 256.0 * TAU).collect();
-                self.compare_ways(&mut report, self.visits[*now].node, arrival.dart(), &seen);
+                let sighting = Sighting { arrival: arrival.dart(), seen_rad: seen };
+                sightings.entry(self.visits[*now].node).or_default().push(sighting);
             } else {
                 report.places.1 += 1;
             }
@@ -104,14 +111,38 @@ impl GroundTruth {
             match told.passage.exit {
                 None | Some(Exit::On) => report.exits.2 += 1,
                 Some(exit) => {
-                    report.exits.0 += 1;
                     let binary = if let Exit::Bearing(binary) = exit { binary } else { 0 };
                     let bearing_rad = f64::from(binary) / 256.0 * TAU;
-                    let off_rad =
-                        |way: &super::TrueWay| wrapped(way.bearing_rad - came_by.bearing_rad - bearing_rad).abs();
-                    let ways = self.map.ways(self.visits[*before].node);
-                    let taken = ways.iter().min_by(|one, other| off_rad(one).total_cmp(&off_rad(other)));
-                    report.exits.1 += usize::from(taken.is_none_or(|taken| taken.dart() != (edge, is_reversed)));
+                    exits.push((self.visits[*before].node, came_by.dart(), bearing_rad, (edge, is_reversed)));
+                }
+            }
+        }
+        let mut bearings: BTreeMap<(usize, bool), f64> = BTreeMap::new();
+        for (&node, sightings) in &sightings {
+            bearings.extend(self.fitted_bearings(node, sightings));
+        }
+        for node in 0..self.map.nodes.len() {
+            for way in self.map.ways(node) {
+                bearings.entry(way.dart()).or_insert(way.bearing_rad);
+            }
+        }
+        for (node, came_by, bearing_rad, taken) in exits {
+            report.exits.0 += 1;
+            let off_rad = |way: &TrueWay| wrapped(bearings[&way.dart()] - bearings[&came_by] - bearing_rad).abs();
+            let ways = self.map.ways(node);
+            let nearest = ways.iter().min_by(|one, other| off_rad(one).total_cmp(&off_rad(other)));
+            report.exits.1 += usize::from(nearest.is_none_or(|nearest| nearest.dart() != taken));
+        }
+        for (&node, sightings) in &sightings {
+            let ways = self.map.ways(node);
+            for sighting in sightings {
+                let matches = sighting.matches(&ways, &bearings, SAME_WAY_RAD);
+                report.ways.0 += ways.len() - 1;
+                report.ways.1 += ways.len() - 1 - matches.len();
+                report.ways.2 += sighting.seen_rad.len() - matches.len();
+                for (dart, seen_rad) in matches {
+                    let expected_rad = bearings[&dart] - bearings[&sighting.arrival];
+                    report.bearing_errors_rad.push(wrapped(seen_rad - expected_rad));
                 }
             }
         }
@@ -123,23 +154,60 @@ impl GroundTruth {
         report
     }
 
-    fn compare_ways(&self, report: &mut HintReport, node: usize, arrival: (usize, bool), seen: &[f64]) {
-        let came_by = self.map.way(arrival.0, arrival.1);
-        let mut left = seen.to_vec();
-        for way in self.map.ways(node) {
-            if way.dart() == arrival {
-                continue;
+    /// The bearings of the ways of a node that agree best with all sightings, up to a common rotation.
+    fn fitted_bearings(&self, node: usize, sightings: &[Sighting]) -> BTreeMap<(usize, bool), f64> {
+        let ways = self.map.ways(node);
+        let mut bearings: BTreeMap<_, _> = ways.iter().map(|way| (way.dart(), way.bearing_rad)).collect();
+        for _ in 0..FIT_ROUNDS {
+            let mut corrections: BTreeMap<(usize, bool), Vec<f64>> = BTreeMap::new();
+            for sighting in sightings {
+                for (dart, seen_rad) in sighting.matches(&ways, &bearings, NEAR_WAY_RAD) {
+                    let error_rad = wrapped(seen_rad - (bearings[&dart] - bearings[&sighting.arrival]));
+                    corrections.entry(dart).or_default().push(0.5 * error_rad);
+                    corrections.entry(sighting.arrival).or_default().push(-0.5 * error_rad);
+                }
             }
-            report.ways.0 += 1;
-            let error_rad = |bearing_rad: f64| wrapped(bearing_rad - (way.bearing_rad - came_by.bearing_rad));
-            let off_rad = |index: &usize| error_rad(left[*index]).abs();
-            let nearest = (0..left.len()).min_by(|one, other| off_rad(one).total_cmp(&off_rad(other)));
-            match nearest.filter(|nearest| off_rad(nearest) <= SAME_WAY_RAD) {
-                Some(nearest) => report.bearing_errors_rad.push(error_rad(left.swap_remove(nearest))),
-                None => report.ways.1 += 1,
+            for (dart, corrections) in corrections {
+                *bearings.entry(dart).or_default() += corrections.iter().sum::<f64>() / corrections.len() as f64;
             }
         }
-        report.ways.2 += left.len();
+        bearings
+    }
+}
+
+/// The ways seen at one visit to a node.
+struct Sighting {
+    /// The way by which the robot came.
+    arrival: (usize, bool),
+    /// The bearings of the others relative to it.
+    seen_rad: Vec<f64>,
+}
+
+impl Sighting {
+    /// The ways that were seen, with their bearings relative to the arrival.
+    fn matches(
+        &self,
+        ways: &[TrueWay],
+        bearings: &BTreeMap<(usize, bool), f64>,
+        within_rad: f64,
+    ) -> Vec<((usize, bool), f64)> {
+        let others: Vec<_> = ways.iter().map(TrueWay::dart).filter(|dart| *dart != self.arrival).collect();
+        let off_rad =
+            |dart: &(usize, bool), seen_rad: f64| wrapped(seen_rad - (bearings[dart] - bearings[&self.arrival])).abs();
+        let mut pairs: Vec<(f64, (usize, bool), usize)> = Vec::new();
+        for dart in &others {
+            for (index, &seen_rad) in self.seen_rad.iter().enumerate() {
+                pairs.push((off_rad(dart, seen_rad), *dart, index));
+            }
+        }
+        pairs.sort_by(|one, other| one.0.total_cmp(&other.0));
+        let mut matches: Vec<((usize, bool), usize)> = Vec::new();
+        for (off_rad, dart, index) in pairs {
+            if off_rad <= within_rad && matches.iter().all(|known| known.0 != dart && known.1 != index) {
+                matches.push((dart, index));
+            }
+        }
+        matches.into_iter().map(|(dart, index)| (dart, self.seen_rad[index])).collect()
     }
 }
 

@@ -97,6 +97,11 @@ impl Rover {
         self.pose.position
     }
 
+    /// Heading of the robot in milliradians, counter-clockwise from the x axis, −3142 to 3142.
+    pub fn heading_mrad(&self) -> i16 {
+        self.pose.heading_mrad()
+    }
+
     /// Follows a velocity command until the next frame.
     pub fn follow(&mut self, velocity: VelocityCommand) {
         let WheelSpeeds { left_permille, right_permille } = WheelSpeeds::from_velocity(velocity, &self.body.wheels);
