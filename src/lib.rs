@@ -109,7 +109,8 @@
 //!
 //! # The paper
 //!
-//! [`PaperFilter`] is the filter of the paper. [`RobustFilter`], the default, goes beyond it; `docs/inference.md` describes it.
+//! [`PaperFilter`] is the filter of the paper. [`OrderedFilter`], the robot's default, also uses ways, exits and travel times;
+//! [`RobustFilter`] is the choice for radii alone. `docs/inference.md` describes both.
 //!
 //! F. Werner, F. Maire, J. Sitte, H. Choset, S. Tully, G. Kantor: *Topological SLAM using Neighbourhood Information of
 //! Places*. All numbers of equations, definitions and sections refer to it.

@@ -222,8 +222,7 @@ impl Walk {
         let reported = if bearing == 0.0 { Some(at) } else { reported.filter(|way| off(way) <= SAME_WAY) };
         match reported {
             None if exit == self.darts() => {
-                (1.0 - model.wrong_exit).ln() - (degree + 1.0).ln()
-                    + self.ln_unseen(model, self.looks[self.vertex(at)])
+                (1.0 - model.wrong_exit).ln() - (degree + 1.0).ln() + self.ln_unseen(model, self.looks[self.vertex(at)])
             }
             Some(way) if way == exit => (1.0 - model.wrong_exit).ln() - degree.ln(),
             _ => (model.wrong_exit / (degree - 1.0).max(1.0)).ln() - degree.ln(),
@@ -252,7 +251,8 @@ impl Walk {
         if is_new || is_driven {
             return ln_travel;
         }
-        let frontiers = self.rotation.partner.iter().filter(|partner| partner.is_none()).count() - usize::from(is_unseen);
+        let frontiers =
+            self.rotation.partner.iter().filter(|partner| partner.is_none()).count() - usize::from(is_unseen);
         let mut closed = self.rotation.clone();
         closed.partner[exit] = Some(arrival);
         closed.partner[arrival] = Some(exit);

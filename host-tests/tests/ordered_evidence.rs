@@ -52,8 +52,7 @@ fn compare(building: &Building, seed: u64, places: usize) {
         visits.push(visit(&observation));
         let update = filter.observe(observation);
         let deviation = f64::from(filter.noise_mm()) / f64::from(Fingerprint::STEP_MM);
-        let model =
-            Model { deviation, wrong_exit: 0.04, missed_way: 0.05, false_way: 0.02, bearing: 0.1, travel: 0.1 };
+        let model = Model { deviation, wrong_exit: 0.04, missed_way: 0.05, false_way: 0.02, bearing: 0.1, travel: 0.1 };
         let darts = filter.darts().unwrap();
         let mut walk = Walk::default();
         for (index, (visit, arrival)) in visits.iter().zip(filter.path()).enumerate() {

@@ -271,7 +271,7 @@ fn a_late_listener_converges_after_one_round_of_the_repeated_map() {
 
 /// Every other robot knows the ways.
 const fn has_ways(seed: u64) -> bool {
-    seed % 2 == 0
+    seed.is_multiple_of(2)
 }
 
 /// A round with ways has twice as many ticks, in each of which a frame may be lost.

@@ -23,7 +23,7 @@
 use toposlam::persist::Persist;
 use toposlam::place::Place;
 use toposlam::reference::robust::{self, VERTICES};
-use toposlam::reference::{self, paper};
+use toposlam::reference::{self, ordered, paper};
 use toposlam::ring::{RingFrame, RingGeometry};
 use toposlam::{ConfigError, Darts, FaultCounters, Filter, Map, Mapper, MapperConfig, Passage, Update};
 
@@ -49,24 +49,30 @@ pub enum FilterChoice {
 
 /// The robot's stages with either filter, for a ring of `SONARS`. It is used as a trait object, so that users of a
 /// mapping do not compile the filters again.
-trait Stages<const SONARS: usize> {
+trait Stages<const SONARS: usize, const V: usize> {
     fn observe(&mut self, frame: &RingFrame<SONARS>, passage: Passage) -> Option<(Place, Update)>;
-    fn map(&self) -> &Map<VERTICES>;
+    fn map(&self) -> &Map<V>;
+    /// The ways of the map, if the filter knows them.
+    fn darts(&self) -> Option<Darts<'_>>;
     fn faults(&self) -> FaultCounters;
     /// The vertices of the newest places.
     fn path(&self) -> Vec<usize>;
 }
 
-/// The stages with the robust filter.
-struct Robust<const SONARS: usize>(Box<Mapper<SONARS, VERTICES, robust::Filter>>);
+/// The stages with a filter that has a path.
+struct WithPath<const SONARS: usize, const V: usize, F>(Box<Mapper<SONARS, V, F>>);
 
-impl<const SONARS: usize> Stages<SONARS> for Robust<SONARS> {
+impl<const SONARS: usize, const V: usize, F: Filter<V>> Stages<SONARS, V> for WithPath<SONARS, V, F> {
     fn observe(&mut self, frame: &RingFrame<SONARS>, passage: Passage) -> Option<(Place, Update)> {
         self.0.observe(frame, passage)
     }
 
-    fn map(&self) -> &Map<VERTICES> {
+    fn map(&self) -> &Map<V> {
         self.0.map()
+    }
+
+    fn darts(&self) -> Option<Darts<'_>> {
+        self.0.filter().darts()
     }
 
     fn faults(&self) -> FaultCounters {
@@ -74,14 +80,16 @@ impl<const SONARS: usize> Stages<SONARS> for Robust<SONARS> {
     }
 
     fn path(&self) -> Vec<usize> {
-        self.0.filter().path().map(usize::from).collect()
+        let mut path: Vec<usize> = (0..).map_while(|ago| self.0.filter().recent(ago)).map(usize::from).collect();
+        path.reverse();
+        path
     }
 }
 
 /// The stages with the paper's filter, whose particles have paths only through a log.
 struct Paper<const SONARS: usize>(Box<Mapper<SONARS, VERTICES, paper::Filter>>, Ancestry);
 
-impl<const SONARS: usize> Stages<SONARS> for Paper<SONARS> {
+impl<const SONARS: usize> Stages<SONARS, VERTICES> for Paper<SONARS> {
     fn observe(&mut self, frame: &RingFrame<SONARS>, passage: Passage) -> Option<(Place, Update)> {
         let Self(mapper, ancestry) = self;
         let observed = mapper.observe(frame, passage)?;
@@ -92,6 +100,10 @@ impl<const SONARS: usize> Stages<SONARS> for Paper<SONARS> {
 
     fn map(&self) -> &Map<VERTICES> {
         self.0.map()
+    }
+
+    fn darts(&self) -> Option<Darts<'_>> {
+        None
     }
 
     fn faults(&self) -> FaultCounters {
@@ -106,8 +118,8 @@ impl<const SONARS: usize> Stages<SONARS> for Paper<SONARS> {
 }
 
 /// The robot's stages for a ring of `SONARS`, with the capacities of the reference robot, and a log of their steps.
-pub struct Mapping<const SONARS: usize> {
-    stages: Box<dyn Stages<SONARS>>,
+pub struct Mapping<const SONARS: usize, const V: usize = VERTICES> {
+    stages: Box<dyn Stages<SONARS, V>>,
     steps: Vec<Step>,
 }
 
@@ -118,6 +130,17 @@ impl Mapping<{ reference::SONARS }> {
     /// The first setting that is out of its range.
     pub fn reference(filter: FilterChoice) -> Result<Self, ConfigError> {
         Self::start(reference::RING, filter)
+    }
+}
+
+impl Mapping<{ reference::SONARS }, { ordered::VERTICES }> {
+    /// Starts a mapping with the ordered filter of the reference robot.
+    ///
+    /// # Errors
+    /// The first setting that is out of its range.
+    pub fn ordered() -> Result<Self, ConfigError> {
+        let mapper: Box<Mapper<_, _, ordered::Filter>> = started(reference::RING, ordered::FILTER)?;
+        Ok(Self { stages: Box::new(WithPath(mapper)), steps: Vec::new() })
     }
 }
 
@@ -133,13 +156,17 @@ impl Mapping<SONARS_MAX> {
 
 impl<const SONARS: usize> Mapping<SONARS> {
     fn start(geometry: RingGeometry<SONARS>, filter: FilterChoice) -> Result<Self, ConfigError> {
-        let stages: Box<dyn Stages<SONARS>> = match filter {
-            FilterChoice::Robust => Box::new(Robust(started(geometry, robust::FILTER)?)),
+        let stages: Box<dyn Stages<SONARS, VERTICES>> = match filter {
+            FilterChoice::Robust => {
+                Box::new(WithPath::<SONARS, VERTICES, robust::Filter>(started(geometry, robust::FILTER)?))
+            }
             FilterChoice::Paper => Box::new(Paper(started(geometry, paper::FILTER)?, Ancestry::new())),
         };
         Ok(Self { stages, steps: Vec::new() })
     }
+}
 
+impl<const SONARS: usize, const V: usize> Mapping<SONARS, V> {
     /// Processes one frame and what the drive knows of the way from the previous place. Returns a step when a place was
     /// detected.
     pub fn observe(&mut self, frame: &RingFrame<SONARS>, passage: Passage) -> Option<Step> {
@@ -157,8 +184,13 @@ impl<const SONARS: usize> Mapping<SONARS> {
     }
 
     /// The best map.
-    pub fn map(&self) -> &Map<VERTICES> {
+    pub fn map(&self) -> &Map<V> {
         self.stages.map()
+    }
+
+    /// The ways of the best map, if the filter knows them.
+    pub fn darts(&self) -> Option<Darts<'_>> {
+        self.stages.darts()
     }
 
     /// Fault counts of the detector and the filter.
@@ -231,10 +263,10 @@ pub fn has_driven_ways(darts: Darts<'_>, ground_truth: &GroundTruth) -> bool {
     RotationSystem::from(darts).is_isomorphic_to(&driven)
 }
 
-fn started<const SONARS: usize, F: Filter<VERTICES>>(
+fn started<const SONARS: usize, const V: usize, F: Filter<V>>(
     geometry: RingGeometry<SONARS>,
     filter: F::Config,
-) -> Result<Box<Mapper<SONARS, VERTICES, F>>, ConfigError> {
+) -> Result<Box<Mapper<SONARS, V, F>>, ConfigError> {
     let mut mapper = Box::new(Mapper::new());
     let (place, seed) = (reference::PLACE, reference::SEED);
     mapper.start(&MapperConfig::new(geometry, filter).with_place(place).with_seed(seed))?;

@@ -223,8 +223,10 @@ fn permille(text: &str) -> Result<u16, String> {
 pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     let default = if arguments.course.hints.ways { FilterArgument::Ordered } else { FilterArgument::Robust };
     let filters = arguments.filter.chosen(default, arguments.plot.is_some())?;
-    let evaluations =
-        filters.iter().map(|&filter| arguments.course.settings(filter, arguments.filter.robot)).collect::<anyhow::Result<Vec<_>>>()?;
+    let evaluations = filters
+        .iter()
+        .map(|&filter| arguments.course.settings(filter, arguments.filter.robot))
+        .collect::<anyhow::Result<Vec<_>>>()?;
     let settings = &evaluations[0];
     // All errors in the files are reported before the first path starts.
     let cases = arguments.cases.load()?;

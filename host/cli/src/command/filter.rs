@@ -1,5 +1,6 @@
 //! Command-line option for the filter.
 
+use anyhow::bail;
 use clap::ValueEnum;
 use toposlam_eval::mapping::FilterChoice;
 
@@ -14,11 +15,13 @@ pub(super) enum FilterArgument {
     Paper,
 }
 
-impl From<FilterArgument> for FilterChoice {
-    fn from(argument: FilterArgument) -> Self {
-        match argument {
-            FilterArgument::Ordered | FilterArgument::Robust => Self::Robust,
-            FilterArgument::Paper => Self::Paper,
+impl FilterArgument {
+    /// The filter for a recording, which does not say by which exits the robot left.
+    pub(super) fn for_recording(self) -> anyhow::Result<FilterChoice> {
+        match self {
+            Self::Ordered => bail!("a recording has no exits: choose the robust filter or that of the paper"),
+            Self::Robust => Ok(FilterChoice::Robust),
+            Self::Paper => Ok(FilterChoice::Paper),
         }
     }
 }

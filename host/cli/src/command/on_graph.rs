@@ -3,8 +3,9 @@
 
 use clap::{Args, ValueEnum};
 use toposlam::Passage;
+use toposlam::reference::SONARS;
 use toposlam_cli::progress::Progress;
-use toposlam_eval::mapping::Mapping;
+use toposlam_eval::mapping::{FilterChoice, Mapping};
 use toposlam_sim::world::{GroundTruth, Simulation};
 
 use super::drive::{DriveArguments, Summary};
@@ -16,9 +17,6 @@ pub(super) struct OnGraph {
     /// Move the robot along the true Voronoi graph at random; its own drive is not used.
     #[arg(long, alias = "on-rails")]
     pub(super) on_graph: bool,
-    /// Filter that makes the map.
-    #[arg(long, value_enum, default_value_t = FilterArgument::Robust, requires = "on_graph")]
-    filter: FilterArgument,
     /// Hints that the filter gets besides the ring frames.
     #[arg(long, value_enum, default_value_t = Hints::Turn, requires = "on_graph")]
     hints: Hints,
@@ -33,11 +31,30 @@ enum Hints {
     Turn,
 }
 
-pub(super) fn run(drive: &DriveArguments, options: &OnGraph, places: usize, frames: u64) -> anyhow::Result<()> {
+pub(super) fn run(
+    drive: &DriveArguments,
+    options: &OnGraph,
+    filter: FilterArgument,
+    places: usize,
+    frames: u64,
+) -> anyhow::Result<()> {
+    match filter {
+        FilterArgument::Ordered => map(drive, options, places, frames, Mapping::ordered()?),
+        FilterArgument::Robust => map(drive, options, places, frames, Mapping::reference(FilterChoice::Robust)?),
+        FilterArgument::Paper => map(drive, options, places, frames, Mapping::reference(FilterChoice::Paper)?),
+    }
+}
+
+fn map<const V: usize>(
+    drive: &DriveArguments,
+    options: &OnGraph,
+    places: usize,
+    frames: u64,
+    mut mapping: Mapping<SONARS, V>,
+) -> anyhow::Result<()> {
     let (plan, model) = drive.world()?;
     let mut simulation = Simulation::new(&plan, model, drive.seed())?;
     let mut ground_truth = GroundTruth::new(simulation.true_map());
-    let mut mapping = Mapping::reference(options.filter.into())?;
     let progress = Progress::new("", places, "places");
     let mut driven = 0;
     while mapping.steps().len() < places && (frames == 0 || driven < frames) {
@@ -58,7 +75,7 @@ pub(super) fn run(drive: &DriveArguments, options: &OnGraph, places: usize, fram
         truth: simulation.true_map(),
         ground_truth: &ground_truth,
         map: mapping.map(),
-        darts: None,
+        darts: mapping.darts(),
         is_complete: false,
         path: mapping.path(),
         faults: mapping.faults(),

@@ -45,7 +45,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     let frames = ring.read(recording).with_context(|| format!("recording {}", arguments.recording.display()))?;
 
     // A smaller ring leaves slots of the frame without a sensor; they are dead in every frame.
-    let mut mapping = Mapping::of_recording(&ring, arguments.filter.into())?;
+    let mut mapping = Mapping::of_recording(&ring, arguments.filter.for_recording()?)?;
     for frame in &frames {
         if let Some(step) = mapping.observe(frame, Passage::UNKNOWN) {
             println!("{step}");

@@ -4,13 +4,18 @@ use std::path::PathBuf;
 
 use anyhow::Context;
 use clap::Args;
-use toposlam::reference::SNAPSHOT_BYTES;
+use toposlam::Filter;
+use toposlam::persist::Persist;
+use toposlam::reference::{SONARS, ordered, paper, robust};
+use toposlam::robot::RobotConfig;
+use toposlam::wire::FilterSettings;
 use toposlam_cli::picture::{Drawing, Step, animate};
 use toposlam_cli::progress::Progress;
 use toposlam_sim::exploration::Exploration;
 use toposlam_sim::world::Detection;
 
 use super::drive::{DriveArguments, Summary};
+use super::filter::FilterArgument;
 use super::on_graph::{self, OnGraph};
 
 /// Arguments of `toposlam simulate`.
@@ -27,18 +32,44 @@ pub(crate) struct Arguments {
     /// Write the growing map over the floor plan to an animated SVG file.
     #[arg(long, value_name = "FILE", conflicts_with = "on_graph")]
     animate: Option<PathBuf>,
+    /// Filter that makes the map.
+    #[arg(long, value_enum, default_value_t = FilterArgument::Ordered)]
+    filter: FilterArgument,
     #[command(flatten)]
     on_graph: OnGraph,
 }
 
 pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
-    let Arguments { drive, places, frames, animate: animation, on_graph } = arguments;
+    let Arguments { drive, places, frames, filter, on_graph, .. } = arguments;
     if on_graph.on_graph {
-        return on_graph::run(drive, on_graph, *places, *frames);
+        return on_graph::run(drive, on_graph, *filter, *places, *frames);
     }
+    match filter {
+        FilterArgument::Ordered => explore::<{ ordered::VERTICES }, ordered::Filter>(
+            arguments,
+            &ordered::ROBOT,
+            &mut [0; ordered::SNAPSHOT_BYTES],
+        ),
+        FilterArgument::Robust => {
+            explore::<{ robust::VERTICES }, robust::Filter>(arguments, &robust::ROBOT, &mut [0; robust::SNAPSHOT_BYTES])
+        }
+        FilterArgument::Paper => {
+            explore::<{ paper::VERTICES }, paper::Filter>(arguments, &paper::ROBOT, &mut [0; paper::SNAPSHOT_BYTES])
+        }
+    }
+}
+
+fn explore<const V: usize, F>(
+    arguments: &Arguments,
+    config: &RobotConfig<SONARS, F::Config>,
+    buffer: &mut [u8],
+) -> anyhow::Result<()>
+where
+    F: Filter<V, Config: FilterSettings> + Persist,
+{
+    let Arguments { drive, places, frames, animate: animation, .. } = arguments;
     let (plan, model) = drive.world()?;
-    let mut buffer = [0; SNAPSHOT_BYTES];
-    let mut exploration = Exploration::start(&plan, model, drive.seed(), &mut buffer)?;
+    let mut exploration = Exploration::<V, F>::with_robot(&plan, model, drive.seed(), config, buffer)?;
     let progress = Progress::new("", *places, "places");
     let (mut way, mut steps) = (Vec::new(), Vec::new());
     while exploration.places() < *places && (*frames == 0 || exploration.frames() < *frames) {
@@ -66,7 +97,10 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
 }
 
 /// The current map, with each vertex at the true node of the majority of its visits.
-fn map_now(plan: &str, exploration: &Exploration<'_>, driven: usize) -> Step {
+fn map_now<const V: usize, F>(plan: &str, exploration: &Exploration<'_, V, F>, driven: usize) -> Step
+where
+    F: Filter<V, Config: FilterSettings> + Persist,
+{
     let truth = exploration.rover().true_map();
     let detections: Vec<Detection> = exploration
         .ground_truth()

@@ -32,9 +32,17 @@ pub(super) fn is_planar(graph: &Graph) -> bool {
     graph.vertices() + faces == graph.edges().len() + 2 * graph.parts_without(&[]).len()
 }
 
-/// A biconnected graph with the same order, by additional edges, with its faces; some of them are cut off as triangles.
-/// `None` if the order is not planar.
-pub(super) fn biconnected(graph: &Graph) -> Option<(Graph, Vec<Vec<usize>>, Vec<[usize; 3]>)> {
+/// A biconnected graph and its faces.
+pub(super) struct Faces {
+    pub(super) graph: Graph,
+    /// Every face, as the cycle around it, without `triangles`.
+    pub(super) cycles: Vec<Vec<usize>>,
+    /// The faces that additional edges cut off.
+    pub(super) triangles: Vec<[usize; 3]>,
+}
+
+/// Makes a graph biconnected by additional edges; the order of the others stays. `None` if the order is not planar.
+pub(super) fn biconnected(graph: &Graph) -> Option<Faces> {
     if !is_planar(graph) {
         return None;
     }
@@ -47,10 +55,10 @@ pub(super) fn biconnected(graph: &Graph) -> Option<(Graph, Vec<Vec<usize>>, Vec<
         neighbours[b].push(a);
     }
     let connected = Graph::ordered(neighbours);
-    let mut faces = faces(&connected);
+    let mut cycles = faces(&connected);
     let mut graph = connected.without_order();
     let mut triangles = Vec::new();
-    for face in &mut faces {
+    for face in &mut cycles {
         while let Some(repeated) = (0..face.len()).find(|&index| is_repeated(face, index)) {
             // A vertex that a face passes twice is a cut vertex; an edge past it joins two of the parts that it separates.
             let vertex = face[repeated];
@@ -69,7 +77,7 @@ pub(super) fn biconnected(graph: &Graph) -> Option<(Graph, Vec<Vec<usize>>, Vec<
             face.remove(corner);
         }
     }
-    Some((graph, faces, triangles))
+    Some(Faces { graph, cycles, triangles })
 }
 
 fn is_repeated(face: &[usize], index: usize) -> bool {
@@ -96,11 +104,11 @@ mod tests {
     #[test]
     fn every_face_of_a_biconnected_graph_is_a_cycle() {
         let star = Graph::ordered(vec![vec![1, 2, 3], vec![0], vec![0], vec![0], vec![5], vec![4]]);
-        let (graph, faces, triangles) = biconnected(&star).unwrap();
+        let Faces { graph, cycles, triangles } = biconnected(&star).unwrap();
         assert_eq!(graph.parts_without(&[]).len(), 1);
-        for face in &faces {
+        for face in &cycles {
             assert!(face.len() > 2 && !(0..face.len()).any(|index| is_repeated(face, index)), "{face:?}");
         }
-        assert_eq!(graph.vertices() + faces.len() + triangles.len(), graph.edges().len() + 2);
+        assert_eq!(graph.vertices() + cycles.len() + triangles.len(), graph.edges().len() + 2);
     }
 }

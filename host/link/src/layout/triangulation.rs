@@ -2,7 +2,9 @@
 
 use std::collections::HashMap;
 
-use super::{embedding, graph::Graph, rotation};
+use super::embedding;
+use super::graph::Graph;
+use super::rotation::{self, Faces};
 
 /// A planar embedding in which all faces, the outer one included, are triangles.
 pub(super) struct Triangulation {
@@ -24,12 +26,11 @@ impl Triangulation {
         if graph.vertices() < 3 {
             return None;
         }
-        let (mut graph, mut faces, cut_off) = if graph.is_ordered() {
+        let Faces { mut graph, cycles: mut faces, triangles: cut_off } = if graph.is_ordered() {
             rotation::biconnected(graph)?
         } else {
             let graph = biconnected(graph);
-            let faces = embedding::faces(&graph)?;
-            (graph, faces, Vec::new())
+            Faces { cycles: embedding::faces(&graph)?, graph, triangles: Vec::new() }
         };
         faces.sort_by_key(|face| std::cmp::Reverse(face.len()));
         let rim = faces.first()?.clone();
