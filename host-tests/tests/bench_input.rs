@@ -6,7 +6,10 @@ use toposlam_sim::exploration::Exploration;
 use toposlam_sim::world::{Plan, RobotModel, SONARS};
 
 const PLACES_MM: [u16; 400] = include!("../../src/bin/bench/places.rs");
-const HINTS: [(Option<&[u16]>, Option<u16>, u16); 400] = include!("../../src/bin/bench/hints.rs");
+/// The bearings of the other ways and of the exit in milliradians, and the travel time in ring frames; see `src/bin/bench/hints.rs`.
+type Hint = (Option<&'static [u16]>, Option<u16>, u16);
+
+const HINTS: [Hint; 400] = include!("../../src/bin/bench/hints.rs");
 const FRAMES_MM: [[u16; SONARS]; 200] = include!("../../src/bin/bench/frames.rs");
 
 /// The first places are enough to notice that the recording is of another drive, and take a fraction of the time.

@@ -19,7 +19,7 @@ pub struct DriveConfig {
     /// Minimum range ahead, in millimetres. Default 250. The robot turns away from a nearer obstacle.
     pub clearance_mm: u16,
     /// Maximum duration of a manoeuvre in ring frames, at least 1. Default 100. After it the drive is lost and searches for
-    /// the graph.
+    /// the graph. An edge may take twenty times as long.
     pub timeout_frames: u16,
 }
 

@@ -29,6 +29,8 @@ const CHOOSE_FRAMES: u16 = 12;
 /// For this many frames after departing the robot still counts as at the place: an obstacle that is hidden for a moment
 /// must not make another place.
 const DEPART_FRAMES: u16 = 8;
+/// An edge may take as many times the time of a manoeuvre.
+const EDGE_TIMEOUTS: u16 = 20;
 /// Limit of the heading along an edge, in milliradians: an edge is smooth, and an intermittent echo must not turn the robot
 /// round.
 const MAX_HEADING_MRAD: i16 = 500;
@@ -223,6 +225,10 @@ impl LocalPlanner {
             self.entry_mrad = HALF_TURN_MRAD;
             self.enter(DriveState::Approach);
             return self.approach(scan, obstacles);
+        }
+        // A robot that a wall holds measures the same ranges as one on a very long edge.
+        if self.frames > self.config.timeout_frames.saturating_mul(EDGE_TIMEOUTS) {
+            return self.give_up(scan);
         }
         self.drive(scan, Sector::EDGE, obstacles.spread_mm(), None)
     }
