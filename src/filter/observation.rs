@@ -28,8 +28,18 @@ impl Passage {
     /// passage was taken from.
     ///
     /// The robot came by the opening within 0.7 rad of `entry_mrad`, or of [`Place::behind_mrad`] if that is unknown. Without such
-    /// an opening, it came by a way that was not seen.
+    /// an opening, it came by a way that was not seen. If `entry_mrad` is unknown, the number of ways is [`Place::degree`], and the
+    /// bearings are known only if they are as many.
     pub fn ways(&self, place: &Place, rotation_mrad: i32) -> Option<Ways> {
+        let ways = self.seen_ways(place, rotation_mrad);
+        if self.entry_mrad.is_some() {
+            return ways;
+        }
+        let counted = Ways::from_count(place.degree?).ok()?;
+        ways.filter(|ways| ways.count() == counted.count()).or(Some(counted))
+    }
+
+    fn seen_ways(&self, place: &Place, rotation_mrad: i32) -> Option<Ways> {
         let openings = &place.ways;
         let entry_mrad = self.entry_mrad.map(|entry_mrad| rotated(entry_mrad, rotation_mrad));
         let expected_mrad = entry_mrad.unwrap_or(place.behind_mrad);
