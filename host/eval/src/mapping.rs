@@ -11,7 +11,7 @@
 //! while mapping.steps().len() < 20 {
 //!     let (frame, truth) = simulation.next().expect("a simulation does not end");
 //!     ground_truth.drive(&truth);
-//!     if let Some(step) = mapping.observe(&frame, truth.turn) {
+//!     if let Some(step) = mapping.observe(&frame, truth.passage()) {
 //!         ground_truth.detect(&step.place);
 //!     }
 //! }
