@@ -176,8 +176,10 @@ class Recordings(unittest.TestCase):
         self.assertEqual([text.text for text in entity.texts], [f"{vertex}: {radius} mm" for vertex, radius in radii])
         for disc, (_, radius) in zip(entity.cylinders, radii, strict=True):
             self.assertAlmostEqual(disc.size.x, 2 * int(radius) / 1000)
-        straight = sum(len(line.points) // 2 for line in entity.lines if line.type == 2)
-        self.assertEqual(straight + sum(line.type == 1 for line in entity.lines), edges)
+        # Frontiers are stubs of another colour. Loops and parallel edges have bends, so that an edge can have several segments.
+        lines = [line for line in entity.lines if line.color.r == line.color.g]
+        straight = sum(len(line.points) // 2 for line in lines if line.type == 2)
+        self.assertGreaterEqual(straight + sum(line.type == 1 for line in lines), edges)
         colours = [(disc.color.r, disc.color.g, disc.color.b) for disc in entity.cylinders]
         self.assertEqual([colours.count(colour) == 1 for colour in colours].index(True), at)
         poses = decoded(self.robot, VERTICES)[-1].poses

@@ -68,7 +68,7 @@ pub struct Account {
     pub command_flood: u64,
     /// Requests that the robot's replies reject.
     pub command_refused: u64,
-    /// Places beyond the capacity of the history. The filter counts its faults from the last restored snapshot on.
+    /// Places that found the history full. The filter counts its faults from the last restored snapshot on.
     pub history_full: u64,
 }
 
@@ -162,11 +162,13 @@ impl Soak {
         let places = exploration.places() as u64;
         let observed = u64::from(exploration.robot().mapper().filter().observed());
         let driver = *exploration.ring_faults();
-        let counted_from = auditor.restored_at.max(toposlam::reference::HISTORY as u64);
+        // The first place beyond the history drops its oldest quarter, and so does each that fills it again.
+        let history = toposlam::reference::HISTORY as u64;
+        let drops = |place: &u64| place.checked_sub(history).is_some_and(|beyond| beyond.is_multiple_of(history / 4));
         let account = Account {
             sonar_silent: driver.count(FaultKind::SonarSilent).into(),
             bus_error: driver.count(FaultKind::BusError).into(),
-            history_full: places.saturating_sub(counted_from),
+            history_full: (auditor.restored_at..places).filter(drops).count() as u64,
             ..auditor.account
         };
         Ok(Life {
