@@ -74,20 +74,7 @@ impl<const N: usize, const V: usize, const D: usize, const T: usize> Persist for
         self.base.save(writer, 0)?;
         let count_at = writer.mark();
         writer.u8(0)?;
-        let mut count = 0_u8;
-        for hypothesis in self.beam.iter() {
-            let mark = writer.mark();
-            match hypothesis.save(writer, len) {
-                Ok(()) => count = count.saturating_add(1),
-                Err(SnapshotError::Full) if count > 0 => {
-                    writer.rewind(mark);
-                    break;
-                }
-                Err(error) => return Err(error),
-            }
-        }
-        writer.overwrite(count_at, &[count]);
-        Ok(())
+        writer.as_many_as_fit(count_at, self.beam.iter(), |writer, hypothesis| hypothesis.save(writer, len))
     }
 
     /// Replaces the state by that of a section, settings and seed included; fault counts restart from 0.

@@ -62,20 +62,9 @@ impl<const N: usize, const V: usize, const HISTORY: usize> Persist for RobustFil
         {
             best.save_kept(writer)?;
         }
-        let mut count = 0_u8;
-        for hypothesis in self.beam.iter() {
-            let mark = writer.mark();
-            match hypothesis.save(writer, len, self.localise_only) {
-                Ok(()) => count = count.saturating_add(1),
-                Err(SnapshotError::Full) if count > 0 => {
-                    writer.rewind(mark);
-                    break;
-                }
-                Err(error) => return Err(error),
-            }
-        }
-        writer.overwrite(count_at, &[count]);
-        Ok(())
+        writer.as_many_as_fit(count_at, self.beam.iter(), |writer, hypothesis| {
+            hypothesis.save(writer, len, self.localise_only)
+        })
     }
 
     /// Replaces the state by that of a section, settings and seed included; fault counts restart from 0.

@@ -141,6 +141,32 @@ impl<'a> Writer<'a> {
         self.u32(value.to_bits())
     }
 
+    /// Writes as many items as fit, in order, and their number over the byte at `count_at`.
+    ///
+    /// # Errors
+    /// Errors of `save`; [`SnapshotError::Full`] if there is no room for the first item.
+    pub(crate) fn as_many_as_fit<T>(
+        &mut self,
+        count_at: usize,
+        items: impl Iterator<Item = T>,
+        mut save: impl FnMut(&mut Self, T) -> Result<(), SnapshotError>,
+    ) -> Result<(), SnapshotError> {
+        let mut count = 0_u8;
+        for item in items {
+            let mark = self.mark();
+            match save(self, item) {
+                Ok(()) => count = count.saturating_add(1),
+                Err(SnapshotError::Full) if count > 0 => {
+                    self.rewind(mark);
+                    break;
+                }
+                Err(error) => return Err(error),
+            }
+        }
+        self.overwrite(count_at, &[count]);
+        Ok(())
+    }
+
     /// The position of the next byte.
     pub(crate) fn mark(&self) -> usize {
         self.len
