@@ -1,8 +1,9 @@
 //! Confirms meet points over several frames, and reports each of them once.
 
+use super::meet_point::MeetPoint;
 use super::openings::{MergedOpenings, Openings};
 use super::rotation::RotationEstimate;
-use super::scan::{MeetPoint, RingScan};
+use super::scan::RingScan;
 use super::smoothing::{DEAD_MM, RangeSmoother, SILENT_MM, bridge_dead_sensors};
 use super::{Fingerprint, PlaceConfig};
 use crate::bearing::{HALF_TURN_MRAD, rotated, turn_mrad};

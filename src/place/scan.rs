@@ -1,6 +1,5 @@
 //! One smoothed reading of the ring, and the closest obstacles in it, in separate bearings.
 
-use super::openings::Openings;
 use super::smoothing::{DEAD_MM, SILENT_MM, is_echo};
 use crate::bearing::{rotated, turn_mrad};
 use crate::ring::{Echo, RingGeometry};
@@ -56,17 +55,6 @@ pub struct Obstacles {
     obstacles: [Obstacle; Self::MAX],
     len: usize,
     equidistant: usize,
-}
-
-/// How well one scan shows a meet point.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) struct MeetPoint {
-    /// The spread of the obstacles, `u16::MAX` with fewer than three.
-    pub(super) spread_mm: u16,
-    /// Mean range of the equidistant obstacles.
-    pub(super) radius_mm: u16,
-    /// The openings between the equidistant obstacles.
-    pub(super) openings: Openings,
 }
 
 impl Obstacles {
@@ -151,13 +139,6 @@ impl<const SONARS: usize> RingScan<'_, SONARS> {
             }
         }
         closest
-    }
-
-    /// Measures how well the scan shows a meet point.
-    pub(super) fn meet_point(&self, obstacles: &Obstacles) -> MeetPoint {
-        let openings = self.openings(obstacles);
-        let spread_mm = obstacles.spread_mm().unwrap_or(u16::MAX);
-        MeetPoint { spread_mm, radius_mm: obstacles.radius_mm(), openings }
     }
 
     /// Range and bearing of each sensor.
