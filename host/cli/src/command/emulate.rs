@@ -26,6 +26,7 @@ use super::drive::{DriveArguments, Summary, fault_rate};
 use super::emulate_small;
 use super::filter::FilterArgument;
 use super::hardship;
+use super::machine::MachineArguments;
 use super::received::Received;
 
 /// Directory of the images built by `cargo firmware`.
@@ -37,25 +38,18 @@ const REFERENCE: FilterArgument = FilterArgument::Ordered;
 #[derive(Args)]
 pub(crate) struct Arguments {
     #[command(flatten)]
-    pub(super) drive: DriveArguments,
+    drive: DriveArguments,
     /// Stop after this many detected places.
     #[arg(long, default_value_t = 30)]
-    pub(super) places: usize,
+    places: usize,
     /// The robot: that of the reference board, or the small one on a Cortex-M0 with 16 KiB of RAM (docs/small-robot.md).
     #[arg(long, value_enum, default_value_t = RobotArgument::Reference)]
     robot: RobotArgument,
     /// Filter of the firmware; each one has an image of its own.
     #[arg(long, value_enum, default_value_t = REFERENCE)]
     filter: FilterArgument,
-    /// Firmware image with this filter [default: built with `cargo firmware`].
-    #[arg(long, value_name = "FILE")]
-    pub(super) elf: Option<PathBuf>,
-    /// Emulator to run.
-    #[arg(long, value_name = "PROGRAM", default_value = "qemu-system-arm")]
-    pub(super) qemu: PathBuf,
-    /// Timeout of the whole run, in seconds.
-    #[arg(long, value_name = "SECONDS", default_value_t = 800)]
-    pub(super) timeout_s: u64,
+    #[command(flatten)]
+    machine: MachineArguments,
     /// Fault rate of the sensor bus and the line, 0 to 1: the probability that a bus transfer fails. Every other rate is proportional to
     /// it (docs/faults.md). With faults, the map is compared with the ground truth and not with that of `simulate`.
     #[arg(long, value_name = "RATE", default_value_t = 0.0, value_parser = fault_rate)]
@@ -88,8 +82,13 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
         ensure!(arguments.faults == 0.0, "faults are emulated with the reference robot only");
         ensure!(arguments.filter == REFERENCE, "the small robot has the ordered filter only");
         return match arguments.robot {
-            RobotArgument::Small16 => emulate_small::run::<16>(arguments, &["--features", "ring-of-16"]),
-            _ => emulate_small::run::<{ small::SONARS }>(arguments, &[]),
+            RobotArgument::Small16 => emulate_small::run::<16>(
+                &arguments.drive,
+                arguments.places,
+                &arguments.machine,
+                &["--features", "ring-of-16"],
+            ),
+            _ => emulate_small::run::<{ small::SONARS }>(&arguments.drive, arguments.places, &arguments.machine, &[]),
         };
     }
     if arguments.faults > 0.0 {
@@ -121,13 +120,13 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
 
 /// The emulation of an image, which is built unless one was given.
 fn emulation(arguments: &Arguments, image: &str) -> anyhow::Result<Emulation> {
-    let elf = match &arguments.elf {
+    let elf = match &arguments.machine.elf {
         Some(elf) => elf.clone(),
         None => build_firmware(image)?,
     };
     let mut emulation = Emulation::new(elf);
-    emulation.qemu = arguments.qemu.clone();
-    emulation.timeout = Duration::from_secs(arguments.timeout_s);
+    emulation.qemu = arguments.machine.qemu.clone();
+    emulation.timeout = Duration::from_secs(arguments.machine.timeout_s);
     Ok(emulation)
 }
 

@@ -14,8 +14,8 @@ use toposlam_cli::emulator::microbit::Microbit;
 use toposlam_cli::progress::Progress;
 use toposlam_sim::exploration::Exploration;
 
-use super::drive::Summary;
-use super::emulate::Arguments;
+use super::drive::{DriveArguments, Summary};
+use super::machine::MachineArguments;
 
 /// Path of the image below the target directory.
 const IMAGE: &str = "microbit/thumbv6m-none-eabi/release/robot";
@@ -33,23 +33,28 @@ const STACK_RESERVE_BYTES: u64 = 256;
 const RAM_BYTES: u64 = 16 * 1024;
 
 /// Emulates the robot with a ring of `SONARS` sensors; `features` are those of its image.
-pub(super) fn run<const SONARS: usize>(arguments: &Arguments, features: &[&str]) -> anyhow::Result<()> {
-    let elf = match &arguments.elf {
+pub(super) fn run<const SONARS: usize>(
+    drive: &DriveArguments,
+    places: usize,
+    machine: &MachineArguments,
+    features: &[&str],
+) -> anyhow::Result<()> {
+    let elf = match &machine.elf {
         Some(elf) => elf.clone(),
         None => build(features)?,
     };
-    let (plan, model) = arguments.drive.world_for_ring(SONARS)?;
-    let (seed, robot) = (arguments.drive.seed(), small::robot::<SONARS>());
+    let (plan, model) = drive.world_for_ring(SONARS)?;
+    let (seed, robot) = (drive.seed(), small::robot::<SONARS>());
     let mut exploration = Exploration::<VERTICES, Filter, SONARS>::with_robot(&plan, model, seed, &robot, &mut [])?;
-    let timeout = Duration::from_secs(arguments.timeout_s);
-    let mut machine = Microbit::<SONARS>::start(&arguments.qemu, &elf, timeout)?;
+    let timeout = Duration::from_secs(machine.timeout_s);
+    let mut microbit = Microbit::<SONARS>::start(&machine.qemu, &elf, timeout)?;
     let mut lines = Lines::default();
-    let progress = Progress::new("", arguments.places, "places");
+    let progress = Progress::new("", places, "places");
     let mut messages = 0;
-    while exploration.places() < arguments.places {
+    while exploration.places() < places {
         exploration.board().sent.clear();
         let frame = exploration.frame();
-        machine.send(&frame, &[])?;
+        microbit.send(&frame, &[])?;
         if exploration.map(&frame).is_some()
             && let Some(step) = exploration.steps().last()
         {
@@ -59,15 +64,15 @@ pub(super) fn run<const SONARS: usize>(arguments: &Arguments, features: &[&str])
         let board = exploration.board();
         let velocity = board.velocity;
         for expected in lines.host(&board.sent)? {
-            let message = lines.firmware(&mut machine)?;
+            let message = lines.firmware(&mut microbit)?;
             ensure!(is_same(&message, &expected), "the firmware sent {message:?}, but the simulation {expected:?}");
             messages += 1;
         }
         exploration.drive(velocity);
     }
     drop(progress);
-    let printed = machine.end()?;
-    arguments.drive.summarise(&Summary::of(&plan, &exploration))?;
+    let printed = microbit.end()?;
+    drive.summarise(&Summary::of(&plan, &exploration))?;
     print_figures(&printed)?;
     println!(
         "capacities: {SONARS} sonars, {HYPOTHESES} hypotheses, {VERTICES} vertices, {DARTS} darts, {HISTORY} places"
@@ -96,12 +101,12 @@ impl Lines {
     }
 
     /// The next message of the emulated robot.
-    fn firmware<const SONARS: usize>(&mut self, machine: &mut Microbit<SONARS>) -> anyhow::Result<Message> {
+    fn firmware<const SONARS: usize>(&mut self, microbit: &mut Microbit<SONARS>) -> anyhow::Result<Message> {
         loop {
             if let Some(message) = self.waiting.pop_front() {
                 return Ok(message);
             }
-            self.waiting.extend(decoded(&mut self.firmware, &machine.receive()?)?);
+            self.waiting.extend(decoded(&mut self.firmware, &microbit.receive()?)?);
         }
     }
 }

@@ -1,5 +1,5 @@
 //! The subcommands, one file each, with arguments and implementation. `drive` has the options shared by `simulate` and
-//! `emulate`, `filter` the choice of a filter, `hardship` the emulation with faults, `interrupt` Ctrl-C.
+//! `emulate`, `filter` the choice of a filter, `hardship` the emulation with faults, `interrupt` Ctrl-C, `machine` the emulated machine.
 
 pub(crate) mod console;
 mod drive;
@@ -12,6 +12,7 @@ mod filter;
 pub(crate) mod fleet;
 mod hardship;
 mod interrupt;
+mod machine;
 #[cfg(not(all(feature = "mqtt", feature = "recording")))]
 mod missing;
 pub(crate) mod monitor;
