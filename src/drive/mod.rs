@@ -172,7 +172,7 @@ impl<const V: usize> Drive<V> {
     }
 
     /// Starts to explore with a restored map.
-    #[cfg(feature = "snapshot")]
+    #[cfg(feature = "wire")]
     pub(crate) fn resume(&mut self) {
         self.route_planner.set_goal(Goal::Explore);
         self.local_planner.forget_edge();
