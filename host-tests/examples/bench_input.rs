@@ -55,7 +55,7 @@ fn main() {
             );
             println!("[");
             for step in exploration.steps() {
-                println!("    {},", format!("{:?}", step.told.recorded()).replace("Some([", "Some(&["));
+                println!("    {},", format!("{:?}", step.reported.recorded()).replace("Some([", "Some(&["));
             }
             println!("]");
         }

@@ -35,7 +35,7 @@ fn the_recorded_bench_input_is_the_drive_through_the_office() {
     }
     for (index, step) in exploration.steps().iter().enumerate() {
         assert_eq!(step.place.fingerprint.radius_mm(), PLACES_MM[index], "place {index}");
-        assert_eq!(format!("{:?}", step.told.recorded()), format!("{:?}", HINTS[index]), "place {index}");
+        assert_eq!(format!("{:?}", step.reported.recorded()), format!("{:?}", HINTS[index]), "place {index}");
     }
     assert!(frames > FRAMES_MM.len(), "{frames} frames");
 }

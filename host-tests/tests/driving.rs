@@ -4,7 +4,7 @@ use toposlam::reference::{SNAPSHOT_BYTES, robust};
 use toposlam::wire::Command;
 use toposlam_eval::mapping::score_exploration;
 use toposlam_sim::exploration::Exploration;
-use toposlam_sim::world::{HintReport, Plan, Report, RobotModel, SonarModel, Told};
+use toposlam_sim::world::{HintReport, Plan, Report, ReportedHints, RobotModel, SonarModel};
 
 /// The result of an exploration.
 struct Outcome {
@@ -27,8 +27,8 @@ fn explore(plan: &str, sonar: SonarModel, seed: u64, places: usize) -> Outcome {
         exploration.advance();
     }
     let report = exploration.ground_truth().report();
-    let told: Vec<Told> = exploration.steps().iter().map(|step| step.told).collect();
-    let hints = exploration.ground_truth().hint_report(&told);
+    let reported: Vec<ReportedHints> = exploration.steps().iter().map(|step| step.reported).collect();
+    let hints = exploration.ground_truth().hint_report(&reported);
     Outcome { report, touched: exploration.rover().bumps(), hints, located: score_exploration(&exploration).location }
 }
 
@@ -48,16 +48,16 @@ fn with_a_sonar_at_the_side_dead_no_corridor_is_a_place() {
     let sonar = SonarModel { dead_sonars: 1 << 4, ..SonarModel::default() };
     let Outcome { report, hints, .. } = explore("ring", sonar, 0, 100);
     assert!(report.phantom + report.doubled <= 1, "{report}");
-    let (told, wrong, _) = hints.exits;
-    assert!(told > 80 && wrong <= 3, "{told} exits told, {wrong} wrong");
+    let (reported, wrong, _) = hints.exits;
+    assert!(reported > 80 && wrong <= 3, "{reported} exits reported, {wrong} wrong");
 }
 
 #[test]
 fn with_a_tenth_of_the_echoes_missed_the_exits_are_right() {
     let sonar = SonarModel { missed_share: 0.1, ..SonarModel::default() };
     let Outcome { report, hints, located, .. } = explore("office", sonar, 0, 100);
-    let (told, wrong, _) = hints.exits;
-    assert!(told > 80 && wrong <= 3, "{told} exits told, {wrong} wrong");
+    let (reported, wrong, _) = hints.exits;
+    assert!(reported > 80 && wrong <= 3, "{reported} exits reported, {wrong} wrong");
     assert!(report.missed + report.phantom + report.doubled <= 3, "{report}");
     assert!(located > 0.9, "{located}");
 }
@@ -72,8 +72,8 @@ fn walls_detected_at_a_flat_angle_are_not_places() {
 #[test]
 fn exits_ways_and_travel_times_are_right() {
     let Outcome { hints, .. } = explore("ladder", SonarModel::default(), 2, 60);
-    let (told, wrong, unknown) = hints.exits;
-    assert!(told > 50 && wrong <= 1 && unknown <= 1, "{:?}", hints.exits);
+    let (reported, wrong, unknown) = hints.exits;
+    assert!(reported > 50 && wrong <= 1 && unknown <= 1, "{:?}", hints.exits);
     let (ways, missed, not_there) = hints.ways;
     assert!(ways > 50 && missed <= 1 && not_there <= 1, "{:?}", hints.ways);
     assert!(hints.bearing_errors_rad.iter().all(|error_rad| error_rad.abs() < 0.4));

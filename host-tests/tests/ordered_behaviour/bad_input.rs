@@ -99,7 +99,7 @@ fn contradictory_hints_at_every_place_do_not_end_the_mapping() {
         (0..4).for_each(|_| filter.refine());
         assert!(filter.map().vertices().len() > 0 && filter.score().is_finite());
     }
-    // The filter maps a building afterwards when it is told that it is elsewhere, as far as there is room.
+    // A filter that is started again maps a building.
     filter.start(OrderedConfig::DEFAULT.with_noise_mm(15), 3).unwrap();
     Robot::new(&HOUSE, 3).drive(&mut filter, 90);
     assert!(is_complete(&HOUSE, filter.darts().unwrap()));

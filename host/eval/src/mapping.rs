@@ -30,7 +30,7 @@ use toposlam::{ConfigError, Darts, FaultCounters, Filter, Map, Mapper, MapperCon
 use toposlam::wire::FilterSettings;
 use toposlam_sim::Step;
 use toposlam_sim::exploration::Exploration;
-use toposlam_sim::world::{GroundTruth, Told, TrueMap};
+use toposlam_sim::world::{GroundTruth, ReportedHints, TrueMap};
 
 use crate::ancestry::Ancestry;
 use crate::graph::Graph;
@@ -172,8 +172,8 @@ impl<const SONARS: usize, const V: usize> Mapping<SONARS, V> {
     pub fn observe(&mut self, frame: &RingFrame<SONARS>, passage: Passage) -> Option<Step> {
         let (place, update) = self.stages.observe(frame, passage)?;
         let map = self.map();
-        let told = Told { passage, ways: passage.ways(&place, 0) };
-        let step = Step { place, told, update, vertices: map.vertices().len() as u8, edges: map.edges().count() };
+        let reported = ReportedHints { passage, ways: passage.ways(&place, 0) };
+        let step = Step { place, reported, update, vertices: map.vertices().len() as u8, edges: map.edges().count() };
         self.steps.push(step);
         Some(step)
     }

@@ -58,7 +58,7 @@ pub fn score_map_from(map: &Graph, path: &[usize], truth: &Graph, classes: &[usi
 }
 
 /// Whether a map has the vertices, the edges and the order of the ways of the truth, one for each: the vertices by the class at
-/// which they were mostly visited, and the edges up to their numbers. Loops and parallel edges are told apart.
+/// which they were mostly visited, and the edges up to their numbers. Loops and parallel edges are distinguished.
 ///
 /// # Panics
 /// As [`score_map`].

@@ -28,7 +28,7 @@ use toposlam::{FaultCounters, FaultKind, Filter};
 
 use crate::Step;
 use crate::injector::{FaultRates, LineInjector, RingInjector};
-use crate::world::{BodyModel, GroundTruth, Plan, RobotModel, Rover, Told, VoronoiError};
+use crate::world::{BodyModel, GroundTruth, Plan, ReportedHints, RobotModel, Rover, VoronoiError};
 
 /// Duration of a ring frame on the simulated board, in milliseconds.
 const FRAME_MS: u32 = 100;
@@ -177,7 +177,13 @@ where
             let map = self.robot.mapper().map();
             let (vertices, edges) = (map.vertices().len() as u8, map.edges().count());
             let ways = passage.ways(place, self.robot.mapper().detector().rotation_mrad());
-            self.steps.push(Step { place: *place, told: Told { passage, ways }, update: *update, vertices, edges });
+            self.steps.push(Step {
+                place: *place,
+                reported: ReportedHints { passage, ways },
+                update: *update,
+                vertices,
+                edges,
+            });
         }
         seen
     }

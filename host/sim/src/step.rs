@@ -3,7 +3,7 @@
 use toposlam::Update;
 use toposlam::place::Place;
 
-use crate::world::Told;
+use crate::world::ReportedHints;
 
 /// One detected place and its effect on the map.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -11,7 +11,7 @@ pub struct Step {
     /// The place that the detector reported.
     pub place: Place,
     /// The hints of the drive.
-    pub told: Told,
+    pub reported: ReportedHints,
     /// The filter's update for the place.
     pub update: Update,
     /// Number of vertices of the best map after the update.

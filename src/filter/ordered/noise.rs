@@ -6,7 +6,7 @@ use crate::filter::Exit;
 /// Differences from this many steps on are counted as one.
 const DIFFERENCES: usize = 128;
 
-/// So many returns tell the noise.
+/// The least number of returns for an estimate.
 const RETURNS: u16 = 5;
 
 /// The median of the differences between two visits of one place, in standard deviations of a label.

@@ -75,9 +75,11 @@ impl Building {
                 };
                 let came_by = at;
                 let chosen = rand_core::Rng::next_u32(&mut random) as usize % ways.len();
-                let told = if wrong(step) { (chosen + 1) % ways.len() } else { chosen };
+                let reported = if wrong(step) { (chosen + 1) % ways.len() } else { chosen };
                 exit = Some(
-                    told.checked_sub(1).map_or(Exit::Back, |other| Exit::from_bearing_mrad(others[other].0).unwrap()),
+                    reported
+                        .checked_sub(1)
+                        .map_or(Exit::Back, |other| Exit::from_bearing_mrad(others[other].0).unwrap()),
                 );
                 let leaves = if chosen == 0 { at } else { others[chosen - 1].1 };
                 frames = Some(self.way(leaves).2);

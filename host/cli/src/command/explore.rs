@@ -12,7 +12,7 @@ use toposlam_eval::mapping::score_exploration;
 use toposlam_eval::parallel;
 use toposlam_sim::exploration::Exploration;
 use toposlam_sim::injector::FaultRates;
-use toposlam_sim::world::{HintReport, Plan, Report, RobotModel, Told};
+use toposlam_sim::world::{HintReport, Plan, Report, ReportedHints, RobotModel};
 
 use super::drive::{fault_rate, load_plan, noise_factor, number_in};
 use super::filter::FilterArgument;
@@ -166,10 +166,10 @@ where
     }
     let score = score_exploration(&exploration);
     let seen: std::collections::BTreeSet<usize> = exploration.nodes().iter().copied().flatten().collect();
-    let told: Vec<Told> = exploration.steps().iter().map(|step| step.told).collect();
+    let reported: Vec<ReportedHints> = exploration.steps().iter().map(|step| step.reported).collect();
     let mut run = Run {
         report: exploration.ground_truth().report(),
-        hints: exploration.ground_truth().hint_report(&told),
+        hints: exploration.ground_truth().hint_report(&reported),
         exact: score.exact,
         complete: exploration.robot().drive().is_complete(),
         visited_all: seen.len() == exploration.rover().true_map().nodes.len(),

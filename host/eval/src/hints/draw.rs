@@ -85,7 +85,7 @@ impl Hints {
         hints
     }
 
-    /// The exit as it is told at the next place: among the seen ways, off by one if it is wrong.
+    /// The reported exit: one of the seen ways, off by one if it is wrong.
     fn told_exit(
         &self,
         left_by: Option<usize>,
@@ -98,8 +98,8 @@ impl Hints {
         // Number 0 is the way by which the robot came.
         let number = seen.iter().position(|&(_, way)| way == left_by).map_or(0, |position| position as i64 + 1);
         let off = if wrong < self.wrong / 2.0 { -1 } else { i64::from(wrong < self.wrong) };
-        let told = (number + off).rem_euclid(seen.len() as i64 + 1) as usize;
-        match told.checked_sub(1) {
+        let reported = (number + off).rem_euclid(seen.len() as i64 + 1) as usize;
+        match reported.checked_sub(1) {
             None => Some(Exit::Back),
             Some(position) => Exit::from_bearing_mrad(bearings_mrad[position]).ok(),
         }
@@ -109,12 +109,12 @@ impl Hints {
 /// The reported degree of a place, with `noise` uniform from 0 to 1.
 fn told_degree(degree: usize, noise: f64) -> u8 {
     let one_sided = (1.0 - RIGHT_DEGREE) / 2.0;
-    let told = match noise {
+    let reported = match noise {
         noise if noise < one_sided => degree.saturating_sub(1),
         noise if noise < 2.0 * one_sided => degree + 1,
         _ => degree,
     };
-    told.clamp(1, WAYS_MAX) as u8
+    reported.clamp(1, WAYS_MAX) as u8
 }
 
 #[cfg(test)]
@@ -165,14 +165,14 @@ mod tests {
         assert!((share(hints.iter().map(|hint| hint.ways.is_none())) - 0.3).abs() < 0.02);
         let given = || hints.iter().zip(&truth).filter(|(hint, _)| hint.exit.is_some());
         assert!((share(given().map(|(hint, truth)| hint.exit != truth.exit)) - 0.1).abs() < 0.01);
-        let told = |told, place: fn(usize) -> bool| {
+        let reported = |reported, place: fn(usize) -> bool| {
             let visits = truth.iter().zip(&walk.places).filter(move |&(_, &at)| place(at));
-            share(visits.map(move |(hint, _)| degree(hint) == Some(told)))
+            share(visits.map(move |(hint, _)| degree(hint) == Some(reported)))
         };
-        assert!((told(3, |place| place == 0) - 0.9).abs() < 0.01);
-        assert!((told(2, |place| place == 0) - 0.05).abs() < 0.01);
-        assert!((told(4, |place| place == 0) - 0.05).abs() < 0.01);
-        assert!((told(1, |place| place > 0) - 0.95).abs() < 0.01, "there is no degree 0");
+        assert!((reported(3, |place| place == 0) - 0.9).abs() < 0.01);
+        assert!((reported(2, |place| place == 0) - 0.05).abs() < 0.01);
+        assert!((reported(4, |place| place == 0) - 0.05).abs() < 0.01);
+        assert!((reported(1, |place| place > 0) - 0.95).abs() < 0.01, "there is no degree 0");
     }
 
     /// Two places with parallel corridors, a loop at one, and a dead end at the other.
@@ -190,7 +190,7 @@ mod tests {
         (corridors, walk, hints)
     }
 
-    /// The exit that is told without error.
+    /// The reported exit without errors.
     fn right_exit(corridors: &Corridors, came_by: usize, exit: usize) -> Exit {
         if came_by == exit {
             return Exit::Back;
@@ -214,14 +214,14 @@ mod tests {
     fn ways_are_missed_exits_missing_and_wrong_and_bearings_and_times_noisy_as_stated() {
         let exact = draw_ways("ways,travel").2;
         let (corridors, walk, hints) = draw_ways("ways,travel=0.1,missing=0.2,wrong=0.1");
-        let told = || (2..walk.places.len()).filter(|&step| hints[step].exit.is_some());
+        let reported = || (2..walk.places.len()).filter(|&step| hints[step].exit.is_some());
         assert!((share(hints[1..].iter().map(|hint| hint.exit.is_none())) - 0.2).abs() < 0.01);
-        assert!((share(told().map(|step| hints[step].exit != exact[step].exit)) - 0.1).abs() < 0.03);
+        assert!((share(reported().map(|step| hints[step].exit != exact[step].exit)) - 0.1).abs() < 0.03);
         let deviation = |step: usize| {
             let mean = corridors.travel_frames(walk.arrival(step));
             f64::from(hints[step].travel_frames.unwrap()) / mean - 1.0
         };
-        let mean_square = told().map(|step| deviation(step).powi(2)).sum::<f64>() / told().count() as f64;
+        let mean_square = reported().map(|step| deviation(step).powi(2)).sum::<f64>() / reported().count() as f64;
         assert!((mean_square.sqrt() - 0.1).abs() < 0.005, "{mean_square}");
 
         let (_, _, hints) = draw_ways("ways,missed=0.1");
@@ -240,7 +240,7 @@ mod tests {
             let off = i16::from(*noisy.others()?.first()?) - i16::from(*exact.others()?.first()?);
             Some(f64::from(off) * TAU / 256.0)
         };
-        let squares: Vec<f64> = told().filter_map(turned).map(|off| off * off).collect();
+        let squares: Vec<f64> = reported().filter_map(turned).map(|off| off * off).collect();
         let deviation = (squares.iter().sum::<f64>() / squares.len() as f64).sqrt();
         assert!((deviation - 0.05).abs() < 0.01, "{deviation}");
     }

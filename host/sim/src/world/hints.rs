@@ -8,7 +8,7 @@ use toposlam::{Exit, Passage, Ways};
 use super::ray_casting::wrapped;
 use super::{GroundTruth, TrueWay};
 
-/// A bearing that was told belongs to the way within this angle, in radians.
+/// A bearing that was reported belongs to the way within this angle, in radians.
 const SAME_WAY_RAD: f64 = 0.55;
 /// The same while only the true bearings are known: those of the Voronoi graph, not those of the openings.
 const NEAR_WAY_RAD: f64 = 0.9;
@@ -17,14 +17,14 @@ const FIT_ROUNDS: usize = 20;
 
 /// The hints of one detected place.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Told {
+pub struct ReportedHints {
     /// How the robot drove to the place.
     pub passage: Passage,
     /// The ways that it saw there.
     pub ways: Option<Ways>,
 }
 
-impl Told {
+impl ReportedHints {
     /// The hints in numbers: the bearings of the ways other than the one the robot came by and the exit, in milliradians from that
     /// way, and the travel time, 0 if it is unknown.
     pub fn recorded(&self) -> (Option<Vec<u16>>, Option<u16>, u16) {
@@ -42,20 +42,20 @@ impl Told {
 /// Counts of right, wrong and missing hints. Places count where the robot drove along one edge from the place before.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct HintReport {
-    /// Number of exits that were told, of wrong ones among them, and of exits that were not told.
+    /// Number of exits that were reported, of wrong ones among them, and of exits that were not reported.
     pub exits: (usize, usize, usize),
-    /// Number of places whose ways were told, and of places whose ways were not.
+    /// Number of places whose ways were reported, and of places whose ways were not.
     pub places: (usize, usize),
-    /// Number of true ways, other than the one the robot came by, at places whose ways were told; of those that were missed; and
-    /// of ways that were told and do not exist.
+    /// Number of true ways, other than the one the robot came by, at places whose ways were reported; of those that were missed; and
+    /// of ways that were reported and do not exist.
     pub ways: (usize, usize, usize),
-    /// Told bearing of each way that was found minus its mean over all places at the node, in radians.
+    /// Reported bearing of each way that was found minus its mean over all places at the node, in radians.
     pub bearing_errors_rad: Vec<f64>,
     /// ln of each travel time minus the mean of its edge. Edges with one passage do not count.
     pub travel_errors: Vec<f64>,
     /// The same with the mean of each direction of an edge.
     pub one_way_travel_errors: Vec<f64>,
-    /// Number of travel times that were not told.
+    /// Number of travel times that were not reported.
     pub unknown_travels: usize,
 }
 
@@ -74,26 +74,26 @@ impl HintReport {
 
 impl GroundTruth {
     /// Compares the hints of all detected places, in their order, with the truth.
-    pub fn hint_report(&self, told: &[Told]) -> HintReport {
+    pub fn hint_report(&self, reported: &[ReportedHints]) -> HintReport {
         let mut report = HintReport::default();
         let driven = self.driven();
         let visits = self.visits_of_places();
         let mut travels: BTreeMap<(usize, bool), Vec<f64>> = BTreeMap::new();
         let mut sightings: BTreeMap<usize, Vec<Sighting>> = BTreeMap::new();
         let mut exits = Vec::new();
-        for (place, told) in told.iter().enumerate().skip(1) {
+        for (place, reported) in reported.iter().enumerate().skip(1) {
             let (Some(Some(before)), Some(Some(now))) = (visits.get(place - 1), visits.get(place)) else { continue };
             if *now != before + 1 {
                 continue;
             }
             let Some(&Some((edge, is_reversed))) = driven.get(*before) else { continue };
-            if let Some(frames) = told.passage.travel_frames {
+            if let Some(frames) = reported.passage.travel_frames {
                 travels.entry((edge, is_reversed)).or_default().push(f64::from(frames).ln());
             } else {
                 report.unknown_travels += 1;
             }
             let arrival = self.map.way(edge, !is_reversed);
-            if let Some(ways) = told.ways {
+            if let Some(ways) = reported.ways {
                 report.places.0 += 1;
                 let others = ways.others().unwrap_or(&[]).iter();
                 let seen: Vec<f64> = others.map(|&other| f64::from(other) / 256.0 * TAU).collect();
@@ -108,7 +108,7 @@ impl GroundTruth {
                 continue;
             };
             let came_by = self.map.way(edge_before, !reversed_before);
-            match told.passage.exit {
+            match reported.passage.exit {
                 None | Some(Exit::On) => report.exits.2 += 1,
                 Some(exit) => {
                     let binary = if let Exit::Bearing(binary) = exit { binary } else { 0 };

@@ -29,7 +29,7 @@ mod simulation;
 mod voronoi;
 
 pub use ground_truth::{Detection, GroundTruth, Report};
-pub use hints::{HintReport, Told};
+pub use hints::{HintReport, ReportedHints};
 pub use plan::{Plan, PlanError};
 pub use ray_casting::{SONARS, SonarModel};
 pub use rover::{BodyModel, Rover};
