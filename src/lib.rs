@@ -158,11 +158,10 @@ pub use fault::{FaultCounters, FaultKind};
 pub use filter::{
     Consistency, Direction, Evidence, Exit, Filter, FilterCapacities, History, Ngram, NgramError, NgramLength,
     NgramTable, NgramsFull, Observation, OrderedConfig, OrderedFactors, OrderedFilter, PaperConfig, PaperFactors,
-    PaperFilter, Particle, Passage, Prior, RobustConfig, RobustFactors, RobustFilter, Update, WAYS_MAX, Ways,
-    WaysError, WeightFactors, WorstNgram,
+    PaperFilter, Particle, Passage, Prior, RobustConfig, RobustFactors, RobustFilter, Update, Ways, WaysError,
+    WeightFactors, WorstNgram,
 };
-pub use map::darts::{Bearing, DartMap, WAYS};
-pub use map::{DartId, Darts, Map, PerVertex, VertexId, VertexSet, VerticesFull};
+pub use map::{Bearing, DartId, DartMap, Darts, Map, PerVertex, VertexId, VertexSet, VerticesFull, WAYS_MAX};
 pub use mapper::{Mapper, MapperConfig};
 pub use place::{Fingerprint, FingerprintError};
 

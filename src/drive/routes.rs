@@ -43,7 +43,7 @@ pub(super) fn frames_to<const V: usize>(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::map::darts::DartMap;
+    use crate::map::DartMap;
 
     #[test]
     fn the_shorter_of_two_paths_counts() {

@@ -17,7 +17,7 @@ pub use paper::{
     PaperFilter, Particle, Prior,
 };
 pub use robust::{RobustConfig, RobustFilter};
-pub use ways::{Exit, WAYS_MAX, Ways, WaysError};
+pub use ways::{Exit, Ways, WaysError};
 
 use crate::map::VertexId;
 use rand_core::SeedableRng;

@@ -1,9 +1,7 @@
 //! The ways of a place as a robot sees them, and the exit by which it leaves: bearings relative to the way it came by.
 
+use crate::map::WAYS_MAX;
 use core::fmt;
-
-/// The largest number of ways of a place.
-pub const WAYS_MAX: usize = 7;
 
 /// A full turn in milliradians, rounded down.
 const TURN_MRAD: u16 = 6283;

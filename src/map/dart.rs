@@ -1,8 +1,56 @@
-//! Darts by their number, and the read access to an edge-ordered map.
+//! Darts, by record and by number, and the read access to an edge-ordered map.
 
 use super::VertexId;
-use super::darts::{Dart, VertexWays};
 use core::fmt;
+
+/// The largest number of ways of a place.
+pub const WAYS_MAX: usize = 7;
+
+/// No dart, or no vertex.
+pub(crate) const NONE: u8 = u8::MAX;
+
+/// A bearing as a binary angle, counter-clockwise: 2¹⁶ is a full turn, so that differences wrap around by themselves.
+pub type Bearing = u16;
+
+/// Units of ln(travel time): 2⁻¹² nats.
+pub(crate) const LN_TRAVEL_UNIT: f32 = 4096.0;
+
+/// One way of one vertex: 8 bytes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Dart {
+    pub(super) vertex: u8,
+    pub(super) partner: u8,
+    /// In the frame of its vertex.
+    pub(super) bearing: Bearing,
+    /// At how many visits the way was seen or driven.
+    pub(super) seen: u8,
+    /// How many passages of the edge have a travel time. Held by the end with the smaller number.
+    pub(super) timed: u8,
+    /// Mean of ln(travel time in ring frames) in units of 2⁻¹². Held as `timed`.
+    pub(super) ln_travel: u16,
+}
+
+impl Dart {
+    /// What a slot holds that was never used: all zero, so that an empty map needs no initial values.
+    pub(super) const ZERO: Self = Self { vertex: 0, partner: 0, bearing: 0, seen: 0, timed: 0, ln_travel: 0 };
+
+    pub(super) const NONE: Self = Self { vertex: NONE, partner: NONE, bearing: 0, seen: 0, timed: 0, ln_travel: 0 };
+}
+
+/// The darts of a vertex in counter-clockwise order.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct VertexWays {
+    pub(super) count: u8,
+    pub(super) darts: [u8; WAYS_MAX],
+}
+
+impl VertexWays {
+    pub(super) const NONE: Self = Self { count: 0, darts: [0; WAYS_MAX] };
+
+    pub(super) fn as_slice(&self) -> &[u8] {
+        self.darts.get(..usize::from(self.count)).unwrap_or(&[])
+    }
+}
 
 /// One way of one vertex of an edge-ordered map, by its number, 0 to 253.
 ///
@@ -100,7 +148,7 @@ impl<'a> Darts<'a> {
     pub fn travel_frames(self, dart: DartId) -> Option<u16> {
         let partner = self.partner(dart)?;
         let holder = self.dart(dart.min(partner)).filter(|holder| holder.timed > 0)?;
-        Some(libm::expf(f32::from(holder.ln_travel) / 4096.0) as u16)
+        Some(libm::expf(f32::from(holder.ln_travel) / LN_TRAVEL_UNIT) as u16)
     }
 
     /// The number of passages of the edge of a dart that have a travel time; 0 for a frontier. Saturates at 255.

@@ -3,53 +3,7 @@
 //! One way of one vertex is a *dart*. The partner of a dart is the other end of its edge; a dart without partner is a
 //! *frontier*, a way that was not driven.
 
-use super::dart::Darts;
-
-/// The most ways of a vertex.
-pub const WAYS: usize = 7;
-
-/// No dart, or no vertex.
-pub(crate) const NONE: u8 = u8::MAX;
-
-/// A bearing as a binary angle, counter-clockwise: 2¹⁶ is a full turn, so that differences wrap around by themselves.
-pub type Bearing = u16;
-
-/// One way of one vertex: 8 bytes.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) struct Dart {
-    pub(super) vertex: u8,
-    pub(super) partner: u8,
-    /// In the frame of its vertex.
-    pub(super) bearing: Bearing,
-    /// At how many visits the way was seen or driven.
-    pub(super) seen: u8,
-    /// How many passages of the edge have a travel time. Held by the end with the smaller number.
-    pub(super) timed: u8,
-    /// Mean of ln(travel time in ring frames) in units of 2⁻¹². Held as `timed`.
-    pub(super) ln_travel: u16,
-}
-
-impl Dart {
-    /// What a slot holds that was never used: all zero, so that an empty map needs no initial values.
-    const ZERO: Self = Self { vertex: 0, partner: 0, bearing: 0, seen: 0, timed: 0, ln_travel: 0 };
-
-    const NONE: Self = Self { vertex: NONE, partner: NONE, bearing: 0, seen: 0, timed: 0, ln_travel: 0 };
-}
-
-/// The darts of a vertex in counter-clockwise order.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) struct VertexWays {
-    count: u8,
-    darts: [u8; WAYS],
-}
-
-impl VertexWays {
-    const NONE: Self = Self { count: 0, darts: [0; WAYS] };
-
-    pub(super) fn as_slice(&self) -> &[u8] {
-        self.darts.get(..usize::from(self.count)).unwrap_or(&[])
-    }
-}
+use super::dart::{Bearing, Dart, Darts, NONE, VertexWays, WAYS_MAX};
 
 /// An edge-ordered map of at most `V` vertices (`V` ≤ 64) and `D` darts (`D` ≤ 254); vertices and darts are numbered from 0
 /// in the order in which they were added. Loops and parallel edges are ordinary edges.
@@ -213,7 +167,7 @@ impl<const V: usize, const D: usize> DartMap<V, D> {
         let dart = self.darts;
         let before = self.ways(vertex).iter().take_while(|&&way| self.bearing(way) <= bearing).count();
         let slot = self.dart.get_mut(usize::from(dart))?;
-        let ways = self.ways.get_mut(usize::from(vertex)).filter(|ways| usize::from(ways.count) < WAYS)?;
+        let ways = self.ways.get_mut(usize::from(vertex)).filter(|ways| usize::from(ways.count) < WAYS_MAX)?;
         *slot = Dart { vertex, bearing, ..Dart::NONE };
         let mut moved = dart;
         for way in ways.darts.iter_mut().skip(before) {
@@ -370,7 +324,7 @@ impl<const V: usize, const D: usize> DartMap<V, D> {
     fn sort_ways(&mut self, vertex: u8) {
         let Some(ways) = self.ways.get_mut(usize::from(vertex)) else { return };
         let bearing = |dart: u8| self.dart.get(usize::from(dart)).map_or(0, |dart| dart.bearing);
-        let count = usize::from(ways.count).min(WAYS);
+        let count = usize::from(ways.count).min(WAYS_MAX);
         for end in 1..count {
             for slot in (1..=end).rev() {
                 let (Some(&before), Some(&here)) = (ways.darts.get(slot - 1), ways.darts.get(slot)) else { break };

@@ -1,17 +1,20 @@
 //! The topological map: a labelled graph of places and the connections between them (Section II of the paper).
 
 mod dart;
-pub(crate) mod darts;
-pub(crate) mod faces;
+mod darts;
+mod faces;
 mod per_vertex;
 mod vertex;
 mod vertex_set;
 
-pub use dart::{DartId, Darts};
+pub use dart::{Bearing, DartId, Darts, WAYS_MAX};
+pub use darts::DartMap;
 pub use per_vertex::PerVertex;
 pub use vertex::VertexId;
 pub use vertex_set::VertexSet;
 
+pub(crate) use dart::{LN_TRAVEL_UNIT, NONE};
+pub(crate) use faces::DartSet;
 pub(crate) use vertex_set::VertexSet32;
 
 use crate::place::Fingerprint;

@@ -58,7 +58,7 @@ pub(super) fn row_of<const V: usize>(map: &Map<V>, vertex: VertexId) -> Row {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::map::darts::DartMap;
+    use crate::map::DartMap;
     use crate::place::Fingerprint;
 
     #[test]

@@ -4,7 +4,7 @@ use super::choice::{Choice, Gain, Target};
 use super::hypothesis::Hypothesis;
 use super::model::Model;
 use super::record::Record;
-use crate::map::darts::NONE;
+use crate::map::NONE;
 
 /// A hypothesis this far below the best one is dropped, in nats.
 const UNLIKELY: f32 = 1000.0;

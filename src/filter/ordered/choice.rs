@@ -1,8 +1,7 @@
 //! The ways to explain a place: where the robot left the place before and where it came to.
 
 use super::model::Model;
-use crate::map::faces::DartSet;
-use crate::map::{VertexId, VertexSet};
+use crate::map::{DartSet, VertexId, VertexSet};
 
 /// In a path: a place that is not on the map.
 pub(crate) const OFF_MAP: u8 = 254;

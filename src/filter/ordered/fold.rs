@@ -3,7 +3,7 @@
 use super::hypothesis::Hypothesis;
 use super::label::Label;
 use super::model::{Model, SAME_WAY};
-use crate::map::darts::NONE;
+use crate::map::NONE;
 
 /// What a contradiction costs the estimate of what a fold gains, in nats.
 const TORN: f32 = 8.0;
@@ -96,9 +96,9 @@ pub(super) fn fold<const V: usize, const D: usize, const T: usize>(
         left -= 1;
         set_label(hypothesis, kept, both);
         let turn = hypothesis.map.bearing(a).wrapping_sub(hypothesis.map.bearing(b));
-        let mut ways = [NONE; crate::map::darts::WAYS];
+        let mut ways = [NONE; crate::map::WAYS_MAX];
         ways.iter_mut().zip(hypothesis.map.ways(gone)).for_each(|(slot, &way)| *slot = way);
-        let mut taken = [NONE; crate::map::darts::WAYS];
+        let mut taken = [NONE; crate::map::WAYS_MAX];
         for (slot, &way) in ways.iter().enumerate() {
             // What was left behind or identified before is no longer a way of the vertex.
             if way == NONE || hypothesis.map.vertex(way) != gone || union.find(way) != way {

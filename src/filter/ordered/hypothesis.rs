@@ -5,7 +5,7 @@ use super::label::Label;
 use super::model::{LN_WAYS, Model, SAME_WAY};
 use super::record::{Entry, Record};
 use crate::filter::Exit;
-use crate::map::darts::{Bearing, DartMap, NONE, WAYS};
+use crate::map::{Bearing, DartMap, NONE, WAYS_MAX};
 
 /// Labels that are this many standard deviations off are not looked at.
 const FAR: f32 = 5.0;
@@ -256,8 +256,8 @@ impl<const V: usize, const D: usize, const T: usize> Hypothesis<V, D, T> {
         let unseen = usize::from(choice.exit == UNSEEN);
         let vertices = usize::from(choice.target == Target::New);
         usize::from(self.map.vertices()) + vertices <= V
-            && usize::from(self.map.darts()) + vertices * WAYS + unseen <= D
-            && (unseen == 0 || self.map.ways(self.map.vertex(self.at)).len() < WAYS)
+            && usize::from(self.map.darts()) + vertices * WAYS_MAX + unseen <= D
+            && (unseen == 0 || self.map.ways(self.map.vertex(self.at)).len() < WAYS_MAX)
     }
 
     /// Explains observation `index` by a choice; `frame` is the bearing of the first way of a new vertex. Returns whether a way

@@ -8,8 +8,8 @@ use super::record::Record;
 use super::{OrderedConfig, OrderedFilter};
 use crate::config_error::ConfigError;
 use crate::filter::Filter;
+use crate::map::DartMap;
 use crate::map::Map;
-use crate::map::darts::DartMap;
 use crate::place::Fingerprint;
 
 /// The log prior of a kidnapping that was not reported, in nats.

@@ -2,9 +2,9 @@
 
 use super::config::OrderedConfig;
 use super::logarithm;
-use super::record::LN_UNIT;
 use crate::filter::robust::model::Model as LabelModel;
 use crate::filter::robust::special_functions::HALF_LN_2_PI;
+use crate::map::LN_TRAVEL_UNIT;
 use crate::place::Fingerprint;
 
 /// Counts from here on are taken as this.
@@ -230,7 +230,7 @@ impl Model {
         match (ln_travel, timed) {
             (0, _) => 0.0,
             (_, 0) => -LN_TRAVEL_RANGE,
-            _ => self.travels.ln(timed, (f32::from(ln_travel) - f32::from(mean)) / LN_UNIT),
+            _ => self.travels.ln(timed, (f32::from(ln_travel) - f32::from(mean)) / LN_TRAVEL_UNIT),
         }
     }
 

@@ -5,8 +5,7 @@ use super::choice::UNSEEN;
 use super::hypothesis::Hypothesis;
 use crate::filter::worst_ngram::worst_ngram;
 use crate::filter::{OrderedFactors, Update, WeightFactors};
-use crate::map::darts::NONE;
-use crate::map::{DartId, VertexId};
+use crate::map::{DartId, NONE, VertexId};
 use crate::place::Fingerprint;
 
 /// 1 in the unit of probabilities.

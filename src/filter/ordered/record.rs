@@ -1,10 +1,7 @@
 //! The newest observations, packed: what every hypothesis explains.
 
 use crate::filter::{Exit, Observation, Ways};
-use crate::map::darts::{Bearing, WAYS};
-
-/// Units of ln(travel time): 2⁻¹² nats.
-pub(super) const LN_UNIT: f32 = 4096.0;
+use crate::map::{Bearing, LN_TRAVEL_UNIT, WAYS_MAX};
 
 /// Flags beside the number of ways, which takes bits 0 to 3.
 const STARTS: u8 = 1 << 4;
@@ -16,19 +13,19 @@ const EXIT_BEARING: u8 = 1 << 7;
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Entry {
     pub(crate) steps: u16,
-    /// ln of the travel time in [`LN_UNIT`]; 0 when it is unknown.
+    /// ln of the travel time in [`LN_TRAVEL_UNIT`]; 0 when it is unknown.
     pub(crate) ln_travel: u16,
     /// The bytes of the ways. The first one holds the flags too.
-    ways: [u8; WAYS],
+    ways: [u8; WAYS_MAX],
     exit: u8,
 }
 
 impl Entry {
-    pub(super) const NONE: Self = Self { steps: 0, ln_travel: 0, ways: [0; WAYS], exit: 0 };
+    pub(super) const NONE: Self = Self { steps: 0, ln_travel: 0, ways: [0; WAYS_MAX], exit: 0 };
 
     pub(super) fn new(observation: &Observation) -> Self {
         let frames = observation.travel_frames.unwrap_or(0);
-        let mut ways = observation.ways.map_or([0; WAYS], Ways::to_bytes);
+        let mut ways = observation.ways.map_or([0; WAYS_MAX], Ways::to_bytes);
         let (exit_flag, exit) = match observation.exit {
             None => (0, 0),
             Some(Exit::On) => (EXIT_ON, 0),
@@ -41,7 +38,7 @@ impl Entry {
         Self {
             steps: observation.fingerprint.steps(),
             // One frame would be 0, which stands for unknown.
-            ln_travel: if frames == 0 { 0 } else { (libm::logf(frames.into()) * LN_UNIT) as u16 + 1 },
+            ln_travel: if frames == 0 { 0 } else { (libm::logf(frames.into()) * LN_TRAVEL_UNIT) as u16 + 1 },
             ways,
             exit,
         }
@@ -49,14 +46,14 @@ impl Entry {
 
     /// The ways, the flags and the exit as the 8 bytes of a snapshot.
     #[cfg(feature = "snapshot")]
-    pub(crate) const fn to_bytes(self) -> [u8; WAYS + 1] {
+    pub(crate) const fn to_bytes(self) -> [u8; WAYS_MAX + 1] {
         let [a, b, c, d, e, f, g] = self.ways;
         [a, b, c, d, e, f, g, self.exit]
     }
 
     /// From the radius, the travel time and the bytes of a snapshot.
     #[cfg(feature = "snapshot")]
-    pub(crate) const fn from_bytes(steps: u16, ln_travel: u16, bytes: [u8; WAYS + 1]) -> Self {
+    pub(crate) const fn from_bytes(steps: u16, ln_travel: u16, bytes: [u8; WAYS_MAX + 1]) -> Self {
         let [a, b, c, d, e, f, g, exit] = bytes;
         Self { steps, ln_travel, ways: [a, b, c, d, e, f, g], exit }
     }

@@ -12,7 +12,7 @@ use super::hypothesis::Hypothesis;
 use super::logarithm::ln;
 use super::replay::Builder;
 use crate::filter::draws;
-use crate::map::darts::NONE;
+use crate::map::NONE;
 use rand_core::Rng;
 use rand_xoshiro::Xoshiro128PlusPlus;
 

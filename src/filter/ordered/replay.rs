@@ -6,7 +6,7 @@ use super::model::Model;
 use super::record::Record;
 use super::translation::Translation;
 use crate::filter::Exit;
-use crate::map::darts::NONE;
+use crate::map::NONE;
 
 /// A visit whose gain is below the typical one by more than this calls for a decision, in nats.
 const SURPRISE: f32 = -6.0;

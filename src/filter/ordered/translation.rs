@@ -2,7 +2,7 @@
 
 use super::hypothesis::Hypothesis;
 use super::model::SAME_WAY;
-use crate::map::darts::NONE;
+use crate::map::NONE;
 
 /// Which vertex and dart of the map that is built stands for each of another map.
 #[derive(Clone, Debug)]

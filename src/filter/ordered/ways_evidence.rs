@@ -3,15 +3,15 @@
 use super::hypothesis::Hypothesis;
 use super::model::{Model, SAME_WAY};
 use super::record::Entry;
-use crate::map::darts::{NONE, WAYS};
+use crate::map::{NONE, WAYS_MAX};
 
 impl<const V: usize, const D: usize, const T: usize> Hypothesis<V, D, T> {
     /// Which way of a vertex each of the other ways seen is, the robot having come by `reference`, and how far it is off; the
     /// closest first.
-    pub(super) fn identify(&self, entry: &Entry, vertex: u8, reference: u8) -> [(u8, i16); WAYS - 1] {
+    pub(super) fn identify(&self, entry: &Entry, vertex: u8, reference: u8) -> [(u8, i16); WAYS_MAX - 1] {
         let base = self.map.bearing(reference);
         let ways = self.map.ways(vertex);
-        let mut found = [(NONE, 0); WAYS - 1];
+        let mut found = [(NONE, 0); WAYS_MAX - 1];
         // Where no two ways seen have the same closest way, each is that one.
         let mut are_different = true;
         for (slot, bearing) in entry.others().enumerate() {

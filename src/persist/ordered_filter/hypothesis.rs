@@ -2,7 +2,7 @@
 
 use super::NOWHERE;
 use crate::filter::ordered::{OFF_MAP, OrderedHypothesis as Hypothesis, OrderedLabel as Label};
-use crate::map::darts::DartMap;
+use crate::map::DartMap;
 use crate::persist::snapshot::{Reader, SnapshotError, Writer};
 use crate::place::Fingerprint;
 

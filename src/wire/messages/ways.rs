@@ -143,7 +143,7 @@ pub struct Exploration {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::map::darts::DartMap;
+    use crate::map::DartMap;
 
     fn way(bearing_mrad: u16, leads_to: Option<(u8, u8)>) -> Way {
         let leads_to = leads_to.map(|(vertex, way)| WayId { vertex, way });
