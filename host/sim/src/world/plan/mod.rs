@@ -74,10 +74,20 @@ fn scaled(segment: Segment, cell_mm: f64) -> Segment {
 
 impl Plan {
     /// The plans that are compiled in: their names and texts.
-    pub const BUILT_IN: [(&'static str, &'static str); 3] = [
+    pub const BUILT_IN: [(&'static str, &'static str); 13] = [
         ("ring", include_str!("../../../plans/ring.txt")),
         ("office", include_str!("../../../plans/office.txt")),
         ("flat", include_str!("../../../plans/flat.txt")),
+        ("apartment", include_str!("../../../plans/apartment.svg")),
+        ("rooms", include_str!("../../../plans/rooms.svg")),
+        ("school", include_str!("../../../plans/school.svg")),
+        ("lhall", include_str!("../../../plans/lhall.svg")),
+        ("ward", include_str!("../../../plans/ward.svg")),
+        ("rotunda", include_str!("../../../plans/rotunda.svg")),
+        ("wing", include_str!("../../../plans/wing.svg")),
+        ("workshop", include_str!("../../../plans/workshop.svg")),
+        ("hshape", include_str!("../../../plans/hshape.svg")),
+        ("maze", include_str!("../../../plans/maze.svg")),
     ];
 
     /// The built-in plan of this name.
