@@ -12,7 +12,7 @@ use toposlam_sim::exploration::Exploration;
 use toposlam_sim::injector::FaultRates;
 use toposlam_sim::world::{Plan, Report, RobotModel};
 
-use super::drive::{fault_rate, load_plan, noise_factor, number_in};
+use super::drive::{fault_rate, load_plan, noise_factor, number_in, start};
 
 /// A goal_status that takes more ring frames is given up.
 const FRAMES_PER_JOURNEY: u64 = 20_000;
@@ -20,9 +20,12 @@ const FRAMES_PER_JOURNEY: u64 = 20_000;
 /// Arguments of `toposlam explore`.
 #[derive(Args)]
 pub(crate) struct Arguments {
-    /// Floor plans: ring, office, flat, or files.
+    /// Floor plans: names of built-in plans, or files (docs/plans.md).
     #[arg(long, value_name = "PLAN,...", value_delimiter = ',', default_value = "office,ring,flat")]
     plans: Vec<String>,
+    /// Start of the robot, in metres in the frame of the only plan [default: the start of the plan, or its most open place].
+    #[arg(long, value_name = "X,Y", value_parser = start, allow_hyphen_values = true)]
+    start: Option<(f64, f64)>,
     /// Factors on every noise of the robot, 0 to 100.
     #[arg(long, value_name = "FACTOR,...", value_delimiter = ',', default_value = "1,2", value_parser = noise_factor)]
     noises: Vec<f64>,
@@ -75,13 +78,14 @@ struct Journeys {
 
 pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     ensure!(arguments.runs > 0, "--runs must be at least 1");
+    ensure!(arguments.start.is_none() || arguments.plans.len() == 1, "--start needs exactly one plan");
     println!(
         "| Plan | Noise | Exact maps | Complete | Located | Found / missed / doubled / phantom | Radius error, median / 90 % \
          | Degree seen / right | Way lost | Bumps | Frames per place | Goals reached / commanded / reached elsewhere |"
     );
     println!("|---|---|---|---|---|---|---|---|---|---|---|---|");
     for name in &arguments.plans {
-        let plan = load_plan(name)?;
+        let plan = load_plan(name, arguments.start)?;
         for &noise in &arguments.noises {
             let runs = parallel::map(arguments.runs, 0, |run| one(arguments, &plan, noise, run as u64 + 1))?;
             let runs: Result<Vec<Run>, _> = runs.into_iter().collect();

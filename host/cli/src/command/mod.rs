@@ -15,6 +15,7 @@ mod interrupt;
 mod missing;
 pub(crate) mod monitor;
 mod on_graph;
+pub(crate) mod plan;
 #[cfg(feature = "recording")]
 pub(crate) mod play;
 #[cfg(feature = "mqtt")]
