@@ -40,7 +40,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     allow_many_connections().context("opening many connections")?;
     let mut lives = Vec::new();
     for (plan, seed) in LIVES {
-        let life = Life::record(&load_plan(plan)?, seed, arguments.frames as usize)?;
+        let life = Life::record(&load_plan(plan, None)?, seed, arguments.frames as usize)?;
         eprintln!("recorded {plan}: {} ring frames, {} bytes", life.frames(), life.bytes());
         lives.push(life);
     }
