@@ -13,11 +13,11 @@ pub(super) struct Grid {
     pub(super) rows: i32,
 }
 
-/// The numbers of what lies in each bucket, one bucket after the other.
+/// What lies in each bucket, one bucket after the other.
 #[derive(Debug)]
-pub(super) struct Buckets {
+pub(super) struct Buckets<T> {
     starts: Vec<u32>,
-    items: Vec<u32>,
+    items: Vec<T>,
 }
 
 impl Grid {
@@ -75,27 +75,20 @@ impl Grid {
     }
 }
 
-impl Buckets {
-    /// Sorts items into buckets: for each item the numbers of its buckets.
-    pub(super) fn new(buckets: usize, items: &[Vec<usize>]) -> Self {
-        let mut starts = vec![0; buckets + 1];
-        items.iter().flatten().for_each(|bucket| starts[bucket + 1] += 1);
-        for bucket in 0..buckets {
-            starts[bucket + 1] += starts[bucket];
+impl<T: Copy> Buckets<T> {
+    /// Sorts items into buckets. `buckets_of` has the numbers of the buckets of each item.
+    pub(super) fn new(buckets: usize, items: &[T], buckets_of: &[Vec<usize>]) -> Self {
+        let mut sorted: Vec<(usize, usize)> = Vec::new();
+        for (item, buckets) in buckets_of.iter().enumerate() {
+            sorted.extend(buckets.iter().map(|bucket| (*bucket, item)));
         }
-        let mut next = starts.clone();
-        let mut sorted = vec![0; starts[buckets] as usize];
-        for (item, item_buckets) in items.iter().enumerate() {
-            for bucket in item_buckets {
-                sorted[next[*bucket] as usize] = item as u32;
-                next[*bucket] += 1;
-            }
-        }
-        Self { starts, items: sorted }
+        sorted.sort_unstable();
+        let starts = (0..=buckets).map(|bucket| sorted.partition_point(|(of, _)| *of < bucket) as u32).collect();
+        Self { starts, items: sorted.into_iter().map(|(_, item)| items[item]).collect() }
     }
 
     /// The items of a bucket.
-    pub(super) fn items(&self, bucket: usize) -> &[u32] {
+    pub(super) fn items(&self, bucket: usize) -> &[T] {
         &self.items[self.starts[bucket] as usize..self.starts[bucket + 1] as usize]
     }
 }

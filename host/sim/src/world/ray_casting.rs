@@ -95,10 +95,11 @@ impl Scene {
     /// Range of the nearest wall that each sonar measures, in millimetres; infinite without an echo.
     fn walls<const SONARS: usize>(&self, pose: &Pose, model: &SonarModel) -> [f64; SONARS] {
         let spacing = TAU / RAYS as f64;
+        let least_cosine = model.specular_limit_rad.cos();
         let rays: [f64; RAYS] = std::array::from_fn(|ray| {
             let direction = pose.heading_rad + ray as f64 * spacing;
             let hit = self.plan.walls().cast(pose.position, direction, model.range_max_mm);
-            if hit.off_normal_rad <= model.specular_limit_rad { hit.range_mm } else { f64::INFINITY }
+            if hit.cosine_off_normal >= least_cosine { hit.range_mm } else { f64::INFINITY }
         });
         let half = ((model.cone_half_angle_rad / spacing) as usize).min(RAYS / 2);
         std::array::from_fn(|sonar| {
@@ -146,7 +147,7 @@ mod tests {
     fn a_ray_ends_at_the_first_wall() {
         let hit = closet().plan.walls().cast(Point::new(1000.0, 600.0), 0.3, 6000.0);
         assert!((hit.range_mm - 3000.0 / 0.3f64.cos()).abs() < 1e-6);
-        assert!((hit.off_normal_rad - 0.3).abs() < 1e-9);
+        assert!((hit.cosine_off_normal - 0.3f64.cos()).abs() < 1e-9);
     }
 
     #[test]
