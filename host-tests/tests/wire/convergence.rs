@@ -1,80 +1,12 @@
 //! Convergence of listeners that join late, lose frames or receive them twice.
 
-use super::robot::{Believer, Random, Robot, TICKS_PER_HELLO};
+use super::listener::{Listener, robot, same};
+use super::robot::{Random, Robot, TICKS_PER_HELLO};
 use super::{frame, vertex};
-use toposlam::wire::{
-    Belief, Decoder, Evidence, Exploration, List, Location, MapReplica, Message, Progress, QueueFull, Remapped,
-    VertexProbability, Way, Worst, map_digest,
-};
-use toposlam::{DartId, DartMap, FaultCounters, FaultKind, Fingerprint, Update, VertexId, WorstNgram};
+use toposlam::wire::{Belief, Evidence, Exploration, Location, Message, QueueFull, Worst, map_digest};
+use toposlam::{DartMap, FaultCounters, FaultKind, Fingerprint, Update, VertexId};
 
 const V: usize = 16;
-
-/// A listener, and whether it agrees with a robot.
-struct Listener<const V: usize> {
-    decoder: Decoder,
-    replica: MapReplica<V>,
-}
-
-impl<const V: usize> Listener<V> {
-    fn new() -> Self {
-        Self { decoder: Decoder::new(), replica: MapReplica::new() }
-    }
-
-    fn decode(&mut self, mut bytes: &[u8]) {
-        loop {
-            bytes = match self.decoder.feed(bytes) {
-                Progress::NeedsMore => return,
-                Progress::Error { rest, .. } => rest,
-                Progress::Message { header, message, rest } => {
-                    self.replica.apply(header, &message);
-                    rest
-                }
-            };
-        }
-    }
-}
-
-/// A robot whose filter knows the ways or only the edges.
-fn robot(has_ways: bool) -> Robot<V> {
-    let robot = Robot::new(1);
-    if has_ways { robot.with_ways() } else { robot }
-}
-
-/// Whether the replica equals the map, compared by vertices, edges and ways and not by the digest.
-fn same<const V: usize, const W: usize>(replica: &MapReplica<W>, filter: &Believer<V>) -> bool {
-    let map = &filter.map;
-    filter.darts.as_ref().is_none_or(|darts| same_ways(replica, darts))
-        && usize::from(replica.vertices()) == map.vertices().len()
-        && replica.is_complete()
-        && replica.edges().eq(map.edges().map(|(a, b)| (a.into(), b.into())))
-        && map.vertices().all(|vertex| {
-            replica.row(vertex.into()).is_some_and(|row| {
-                Some(row.radius_mm) == map.label(vertex).map(Fingerprint::radius_mm)
-                    && row.visits == map.visits(vertex)
-                    && row.neighbours == map.neighbours(vertex).bits()
-            })
-        })
-}
-
-/// Whether every way of a map is in the replica, at its place and with its edge, and no other.
-fn same_ways<const V: usize, const W: usize>(replica: &MapReplica<W>, darts: &DartMap<V, 250>) -> bool {
-    let position = |way| {
-        let ways = darts.ways(darts.vertex(way));
-        ways.iter().position(|&other| other == way).map(|way| way as u8)
-    };
-    (0..darts.vertices()).all(|vertex| {
-        let (of_map, received) = (darts.ways(vertex), replica.ways(vertex));
-        let is_same = |(&dart, way): (&u8, &Way)| {
-            let partner = darts.partner(dart);
-            (f64::from(darts.bearing(dart)) / 65_536.0 * 6283.0 - f64::from(way.bearing_mrad)).abs() <= 1.0
-                && way.leads_to.map(|end| end.vertex) == partner.map(|partner| darts.vertex(partner))
-                && way.leads_to.map(|end| end.way) == partner.and_then(position)
-                && way.travel_frames == DartId::new(dart).and_then(|dart| darts.view().travel_frames(dart))
-        };
-        of_map.len() == received.len() && of_map.iter().zip(received).all(is_same)
-    }) && replica.frontiers().count() == darts.frontiers().count()
-}
 
 #[test]
 fn a_listener_from_the_start_is_converged_after_every_place() {
@@ -136,102 +68,6 @@ fn a_new_vertex_and_its_edge_are_sent_as_events() {
         Message::Worst(Worst::of(&robot.filter, update.place_index)),
     ];
     assert_eq!(told, expected);
-}
-
-/// A chain of vertices with these labels, sent to a listener.
-fn chain(labels: &[u16]) -> (Robot<V>, Listener<V>) {
-    let mut robot = Robot::<V>::new(1);
-    let mut before = None;
-    for &steps in labels {
-        let label = Fingerprint::from_steps(steps).expect("in range");
-        let vertex = robot.filter.map.add_vertex(label).expect("there is room");
-        if let Some(before) = before.replace(vertex) {
-            robot.filter.map.add_edge(before, vertex);
-        }
-    }
-    let mut listener = Listener::new();
-    robot.place(&mut Random(0)).iter().for_each(|frame| listener.decode(frame));
-    (robot, listener)
-}
-
-#[test]
-fn a_merge_sends_one_remapping_and_the_changed_vertices() {
-    let (mut robot, mut listener) = chain(&[100, 200, 300, 400]);
-    // Vertices 3 and 1 are merged; 0 and 2 swap ids. The chain 0-1-2-3 becomes a star around 1.
-    robot.filter.names = [2, 1, 0, 1].map(|now| Some(vertex(now))).to_vec();
-    robot.filter.map.clear();
-    for steps in [300, 200, 100] {
-        robot.filter.map.add_vertex(Fingerprint::from_steps(steps).expect("in range")).expect("there is room");
-    }
-    robot.filter.map.observe(vertex(1), Fingerprint::from_steps(400).expect("in range"));
-    robot.filter.map.add_edge(vertex(0), vertex(1));
-    robot.filter.map.add_edge(vertex(1), vertex(2));
-    let mut told = Vec::new();
-    let update = robot.update();
-    robot.reporter.update(&robot.filter, &update, |message| {
-        told.push(*message);
-        listener.decode(&frame(&mut robot.encoder, message));
-        Ok(())
-    });
-    let Message::Remapped(renamed) = told[0] else { panic!("{told:?}") };
-    assert_eq!(renamed.vertices.as_slice(), [2, 1, 0, 1]);
-    assert_eq!(told[1], Message::Vertex { vertex: 1, radius_mm: 600, visits: 2 });
-    assert!(matches!(told[2], Message::Map { vertices: 3, edges: 2, .. }), "{told:?}");
-    assert!(listener.replica.is_converged() && same(&listener.replica, &robot.filter));
-}
-
-#[test]
-fn all_state_of_a_vertex_follows_its_new_id() {
-    let (mut robot, mut listener) = chain(&[100, 200, 300, 400]);
-    robot.filter.location = vertex(2);
-    robot.filter.worst =
-        WorstNgram { distance_mm: 50, length: 3, newest_age: 1, vertices: [3, 2, 1, 0, 0, 0, 0].map(vertex) };
-    robot.place(&mut Random(0)).iter().for_each(|frame| listener.decode(frame));
-    let rename = |listener: &mut Listener<V>, robot: &mut Robot<V>, names: &[u8]| {
-        let renamed = Remapped { place_index: 2, vertices: List::new(names.iter().copied()) };
-        listener.decode(&frame(&mut robot.encoder, &Message::Remapped(renamed)));
-    };
-    let likely = |listener: &Listener<V>| -> Vec<(u8, u16)> {
-        let belief = listener.replica.belief().expect("a belief was sent");
-        belief.vertices.as_slice().iter().map(|&VertexProbability { vertex, permille }| (vertex, permille)).collect()
-    };
-    assert_eq!(likely(&listener), [(2, 667), (1, 167), (3, 167)]);
-    // 1 and 3 are merged and have id 0; 0 has id 1.
-    rename(&mut listener, &mut robot, &[1, 0, 2, 0]);
-    assert_eq!(listener.replica.location().map(|location| location.vertex), Some(2));
-    assert_eq!(likely(&listener), [(2, 667), (0, 334)]);
-    assert_eq!(listener.replica.worst().map(|worst| worst.vertices), Some(List::new([0, 2, 0])));
-    assert_eq!(listener.replica.edges().collect::<Vec<_>>(), [(0, 1), (0, 2)]);
-    assert_eq!(listener.replica.row(0).map(|row| row.radius_mm), Some(400));
-    assert_eq!(listener.replica.vertices(), 3);
-    assert!(!listener.replica.is_converged());
-    // The vertex of the location was removed, and so was all that refers to it.
-    rename(&mut listener, &mut robot, &[0, 1, 255]);
-    assert_eq!((listener.replica.location(), listener.replica.worst()), (None, None));
-    assert_eq!(likely(&listener), [(0, 334)]);
-    assert_eq!(listener.replica.vertices(), 2);
-}
-
-#[test]
-fn a_lost_remapping_is_repaired_by_one_round_of_the_repeated_map() {
-    for has_ways in [false, true] {
-        let mut random = Random(5);
-        for _ in 0..200 {
-            let mut robot = robot(has_ways);
-            let mut listener = Listener::<V>::new();
-            for _ in 0..40 {
-                robot.drive(&mut random);
-                robot.place(&mut random).iter().for_each(|frame| listener.decode(frame));
-            }
-            robot.repair(&mut random);
-            // The first frame is the `Remapped`.
-            robot.place(&mut random).iter().skip(1).for_each(|frame| listener.decode(frame));
-            for _ in 0..robot.round() {
-                robot.tick(&mut random).iter().for_each(|frame| listener.decode(frame));
-            }
-            assert!(listener.replica.is_converged() && same(&listener.replica, &robot.filter));
-        }
-    }
 }
 
 #[test]
@@ -453,52 +289,6 @@ fn only_the_ways_that_have_changed_are_sent() {
         Ok(())
     });
     assert_eq!(vertices, [2, 7]);
-}
-
-#[test]
-fn ways_follow_new_vertex_ids_without_a_message_of_their_own() {
-    let mut robot = robot(true);
-    let mut random = Random(7);
-    let mut listener = Listener::<V>::new();
-    while robot.filter.map.vertices().len() < 10 {
-        robot.drive(&mut random);
-    }
-    // Edges without travel times.
-    let darts = robot.filter.darts.as_mut().expect("a robot with ways");
-    for (a, b) in darts.edges().collect::<Vec<_>>() {
-        darts.part(a);
-        darts.join(a, b);
-    }
-    robot.place(&mut random).iter().for_each(|frame| listener.decode(frame));
-    let (map, darts) = (robot.filter.map, robot.filter.darts.clone().expect("a robot with ways"));
-    // The same map with all vertices in reverse order.
-    let reversed = |id: VertexId| vertex(9 - id.index());
-    robot.filter.names = map.vertices().map(reversed).map(Some).collect();
-    robot.filter.map.clear();
-    for vertex in map.vertices().rev() {
-        let label = map.label(vertex).expect("a label");
-        let now = robot.filter.map.add_vertex(label).expect("there is room");
-        (1..map.visits(vertex)).for_each(|_| robot.filter.map.observe(now, label));
-    }
-    map.edges().for_each(|(a, b)| robot.filter.map.add_edge(reversed(a), reversed(b)));
-    let now = robot.filter.darts.insert(DartMap::EMPTY);
-    (0..10).for_each(|_| assert!(now.add_vertex().is_some()));
-    let renumbered: Vec<u8> = (0..darts.darts())
-        .map(|dart| now.add_way(9 - darts.vertex(dart), darts.bearing(dart)).expect("there is room"))
-        .collect();
-    for (a, b) in darts.edges() {
-        now.join(renumbered[usize::from(a)], renumbered[usize::from(b)]);
-    }
-    let update = robot.update();
-    let mut sent = Vec::new();
-    robot.reporter.update(&robot.filter, &update, |message| {
-        sent.push(*message);
-        listener.decode(&frame(&mut robot.encoder, message));
-        Ok(())
-    });
-    assert!(listener.replica.is_converged() && same(&listener.replica, &robot.filter));
-    assert!(matches!(sent[0], Message::Remapped(_)), "{sent:?}");
-    assert!(!sent.iter().any(|message| matches!(message, Message::Ways(_))), "{sent:?}");
 }
 
 #[test]

@@ -6,6 +6,8 @@ mod convergence;
 mod damage;
 mod golden;
 mod inbox;
+mod listener;
+mod remapping;
 mod robot;
 mod samples;
 mod schema;

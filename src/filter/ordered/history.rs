@@ -11,7 +11,7 @@ impl<const N: usize, const V: usize, const D: usize, const T: usize> OrderedFilt
     pub(super) fn drop_oldest(&mut self) {
         self.repair_nothing();
         let (len, dropped) = (self.record.len(), (self.record.len() / 4).max(1));
-        if let Some(best) = self.beam.get(0) {
+        if let Some(best) = self.beam.best() {
             self.source.clone_from(best);
         }
         let forgotten = self.base.rest;

@@ -75,7 +75,7 @@ impl<const N: usize, const V: usize, const D: usize, const T: usize> OrderedFilt
             return;
         }
         self.localised_from = None;
-        if let Some(best) = self.beam.get(0) {
+        if let Some(best) = self.beam.best() {
             self.source.clone_from(best);
         }
         if !self.rebuild_with_decisions() {
@@ -87,7 +87,7 @@ impl<const N: usize, const V: usize, const D: usize, const T: usize> OrderedFilt
     /// Takes the next place on the map as it is.
     pub(super) fn localise(&mut self, index: usize) {
         self.beam.localise(&self.model, &self.record, index);
-        let Some(best) = self.beam.get(0) else { return };
+        let Some(best) = self.beam.best() else { return };
         for index in self.localised_from.unwrap_or(0).max(1)..self.record.len() {
             let (from, at) = (best.came_by(index - 1), best.came_by(index));
             let left = best.map.partner(at).map(|partner| best.map.vertex(partner));
@@ -101,7 +101,7 @@ impl<const N: usize, const V: usize, const D: usize, const T: usize> OrderedFilt
         let mapped = self.localised_from.unwrap_or(0).min(self.record.len());
         let mut dropped = (self.record.len() / 4).max(1);
         if mapped > 0 {
-            if let Some(best) = self.beam.get(0) {
+            if let Some(best) = self.beam.best() {
                 self.source.clone_from(best);
             }
             if self.rebuild(0, dropped.min(mapped)).is_some() {
@@ -113,7 +113,7 @@ impl<const N: usize, const V: usize, const D: usize, const T: usize> OrderedFilt
             }
             self.base.rest = 0.0;
         }
-        self.beam.each(|hypothesis| hypothesis.forget_oldest(dropped));
+        self.beam.for_each(|hypothesis| hypothesis.forget_oldest(dropped));
         self.record.drop_oldest(dropped);
         self.path.copy_within(dropped.min(T).., 0);
         self.localised_from = Some(mapped.saturating_sub(dropped));

@@ -174,7 +174,7 @@ impl<const N: usize, const V: usize, const D: usize, const T: usize> OrderedFilt
     }
 
     fn estimate_noise(&mut self) {
-        let Some(best) = self.beam.get(0) else { return };
+        let Some(best) = self.beam.best() else { return };
         let (mut scatter, mut freedom) = (0.0, 0.0);
         for label in best.labels.iter().take(best.map.vertices().into()).filter(|label| label.visits >= 2) {
             scatter += label.scatter;
@@ -191,7 +191,7 @@ impl<const N: usize, const V: usize, const D: usize, const T: usize> OrderedFilt
     /// Computes the evidence of all labels again, for another scale of the noise.
     fn weigh_labels(&mut self) {
         let model = &self.model;
-        self.beam.each(|hypothesis| hypothesis.weigh_labels(model));
+        self.beam.for_each(|hypothesis| hypothesis.weigh_labels(model));
         self.beam.sort();
     }
 

@@ -23,7 +23,7 @@ const EXPLAINED_DEVIATIONS: f32 = 5.0;
 impl<const N: usize, const V: usize, const D: usize, const T: usize> OrderedFilter<N, V, D, T> {
     /// Publishes the best map.
     pub(super) fn publish(&mut self) -> Update {
-        let Some(best) = self.beam.get(0) else { return Update::NONE };
+        let Some(best) = self.beam.best() else { return Update::NONE };
         let vertices = best.map.vertices();
         let vertex_of = |dart: u8| VertexId::new(best.map.vertex(dart));
         // The newest observation is not published yet.
@@ -74,7 +74,7 @@ impl<const N: usize, const V: usize, const D: usize, const T: usize> OrderedFilt
     /// Publishes the belief, the probability of the map, and the n-gram that it explains worst.
     fn publish_probabilities(&mut self) -> Update {
         self.find_worst();
-        let Some(best) = self.beam.get(0) else { return Update::NONE };
+        let Some(best) = self.beam.best() else { return Update::NONE };
         let ids = &self.vertex_ids.ids;
         let (mut same, mut all) = (0.0, 0.0);
         let mut rival = f32::NEG_INFINITY;
@@ -125,7 +125,7 @@ impl<const N: usize, const V: usize, const D: usize, const T: usize> OrderedFilt
 
     /// The score of the best hypothesis in nats.
     pub fn score(&self) -> f32 {
-        self.beam.get(0).map_or(0.0, Hypothesis::score)
+        self.beam.best().map_or(0.0, Hypothesis::score)
     }
 
     /// The standard deviation of the labels that is in use, in millimetres.

@@ -102,12 +102,12 @@ impl<const N: usize, const V: usize, const D: usize, const T: usize> OrderedFilt
         }
         if self.continue_repair(&mut random) {
             self.repair.next = None;
-            if self.draft.score() > self.beam.threshold() {
-                self.beam.insert(&self.draft);
+            if self.draft.score() > self.beam.threshold(N) {
+                self.beam.insert(&self.draft, N);
                 self.repair.chained = 0;
             } else {
                 // A change that loses little may be the first of two that gain.
-                let best = self.beam.get(0).map_or(0.0, Hypothesis::score);
+                let best = self.beam.best().map_or(0.0, Hypothesis::score);
                 let continues = self.draft.score() > best - CHAIN_LOSS && self.repair.chained < CHAIN_LENGTH;
                 self.repair.chained = if continues { self.repair.chained + 1 } else { 0 };
             }

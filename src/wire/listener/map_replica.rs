@@ -6,7 +6,7 @@ use crate::map::VertexSet;
 use crate::WAYS_MAX;
 use crate::wire::decoder::{Arrival, Header};
 use crate::wire::digest::digest;
-use crate::wire::robot::bit;
+use crate::wire::messages::bit;
 use crate::wire::{
     Belief, Evidence, Exploration, GoalStatus, Health, Hello, List, Location, Message, Remapped, Row, VertexWays, Way,
     WayId, Worst,

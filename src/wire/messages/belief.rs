@@ -3,9 +3,9 @@
 use serde::{Deserialize, Serialize};
 
 use super::List;
+use super::message::bit;
 use crate::filter::Filter;
 use crate::map::{VertexId, VertexSet};
-use crate::wire::robot::bit;
 
 /// The belief of the filter after a place: where the robot may be, and how probable the map is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]

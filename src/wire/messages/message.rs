@@ -226,6 +226,11 @@ pub struct Row {
     pub neighbours: u64,
 }
 
+/// The bit of a vertex in a row, 0 from vertex 64 on, so that `bit(v).wrapping_sub(1)` has every bit below `v`.
+pub(in crate::wire) fn bit(vertex: u8) -> u64 {
+    1u64.checked_shl(u32::from(vertex)).unwrap_or(0)
+}
+
 /// The state of the firmware. A value that the firmware does not measure is 0.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Health {

@@ -26,3 +26,5 @@ pub use payload::Payload;
 pub use reply::{Info, Outcome, Refusal, Reply, Version};
 pub use setting::{FilterSettings, Setting, Settings};
 pub use ways::{Exploration, VertexWays, Way, WayId};
+
+pub(in crate::wire) use message::bit;

@@ -2,11 +2,10 @@
 
 mod inbox;
 mod reporter;
+mod sent_map;
 mod sent_ways;
 mod staging;
 
 pub use inbox::Inbox;
 pub use reporter::{QueueFull, Reporter};
 pub use staging::Staging;
-
-pub(in crate::wire) use reporter::bit;

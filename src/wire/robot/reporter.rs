@@ -8,7 +8,7 @@ use crate::map::Darts;
 use crate::mapper::Mapper;
 use crate::place::Place;
 use crate::wire::digest::{map_digest, row_of};
-use crate::wire::robot::sent_ways::SentWays;
+use crate::wire::robot::sent_map::SentMap;
 use crate::wire::{
     Belief, Capacities, Evidence, Exploration, Hello, List, Location, Message, Remapped, ResetCause, Row, VertexWays,
     Worst,
@@ -24,10 +24,7 @@ pub struct Reporter<const V: usize> {
     hello: Hello,
     ticks_per_hello: u16,
     ticks_to_hello: u16,
-    vertices: u8,
-    labels: [(u16, u32); V],
-    neighbours: [u64; V],
-    ways: [SentWays; V],
+    sent: SentMap<V>,
     /// The number of vertices of the filter's map after the last place.
     vertices_before: u8,
     location: Option<Location>,
@@ -62,10 +59,7 @@ impl<const V: usize> Reporter<V> {
             },
             ticks_per_hello: 0,
             ticks_to_hello: 0,
-            vertices: 0,
-            labels: [(0, 0); V],
-            neighbours: [0; V],
-            ways: [SentWays::NONE; V],
+            sent: SentMap::new(),
             vertices_before: 0,
             location: None,
             belief: None,
@@ -85,9 +79,7 @@ impl<const V: usize> Reporter<V> {
         self.hello = hello;
         self.ticks_per_hello = ticks_per_hello;
         self.ticks_to_hello = 0;
-        self.vertices = 0;
-        self.neighbours = [0; V];
-        self.ways = [SentWays::NONE; V];
+        self.sent.clear();
         self.vertices_before = 0;
         self.location = None;
         self.belief = None;
@@ -111,7 +103,7 @@ impl<const V: usize> Reporter<V> {
     /// Announces that every vertex is removed, before the map is cleared or replaced. [`Reporter::start`] follows, or
     /// updates and ticks with the new map.
     pub fn forget(&mut self, mut send: impl FnMut(&Message) -> Result<(), QueueFull>) {
-        let vertices = self.vertices.max(self.vertices_before);
+        let vertices = self.sent.vertices().max(self.vertices_before);
         if vertices == 0 {
             return;
         }
@@ -193,41 +185,41 @@ impl<const V: usize> Reporter<V> {
             changed = true;
             self.note_remapped(&remapped);
         }
-        let sent_vertices = self.vertices;
+        let sent_vertices = self.sent.vertices();
         let vertices = map.vertices().len() as u8;
         if vertices < sent_vertices {
-            self.forget_from(vertices);
+            self.sent.truncate(vertices);
         }
         changed |= vertices != sent_vertices;
         for vertex in map.vertices() {
             let row = row_of(map, vertex);
-            if self.flips(&row).count_ones() > 1 {
+            if self.sent.flips(&row).count_ones() > 1 {
                 changed = true;
                 self.send_row(row, &mut send);
-            } else if self.sent_label(row.vertex) != Some((row.radius_mm, row.visits)) {
+            } else if !self.sent.has_label(&row) {
                 changed = true;
                 let Row { vertex, radius_mm, visits, .. } = row;
                 if self.send(&Message::Vertex { vertex, radius_mm, visits }, &mut send) {
-                    self.note_label(&row);
+                    self.sent.set_label(&row);
                 }
             }
         }
         for row in map.vertices().map(|vertex| row_of(map, vertex)) {
-            let flips = self.flips(&row);
+            let flips = self.sent.flips(&row);
             changed |= flips != 0;
             // More than one: the queue refused the row, and the repeated map will send it.
             if flips.count_ones() == 1 {
                 let (a, b) = (row.vertex, flips.trailing_zeros() as u8);
                 let present = row.neighbours & flips != 0;
                 if self.send(&Message::Edge { a, b, present }, &mut send) {
-                    self.note_edge(a, b, present);
+                    self.sent.set_edge(a, b, present);
                 }
             }
         }
         if let Some(darts) = filter.darts() {
             for vertex in map.vertices() {
                 let ways = VertexWays::of(darts, vertex);
-                if self.ways.get(vertex.index()) != Some(&SentWays::of(&ways)) {
+                if !self.sent.has_ways(&ways) {
                     changed = true;
                     self.send_ways(&ways, &mut send);
                 }
@@ -325,18 +317,15 @@ impl<const V: usize> Reporter<V> {
     fn send_row(&mut self, row: Row, send: &mut impl FnMut(&Message) -> Result<(), QueueFull>) -> bool {
         let taken = self.send(&Message::Row(row), send);
         if taken {
-            self.note_label(&row);
-            for vertex in 0..V as u8 {
-                self.note_edge(row.vertex, vertex, row.neighbours & bit(vertex) != 0);
-            }
+            self.sent.set_row(&row);
         }
         taken
     }
 
     fn send_ways(&mut self, ways: &VertexWays, send: &mut impl FnMut(&Message) -> Result<(), QueueFull>) -> bool {
         let taken = self.send(&Message::Ways(*ways), send);
-        if let (true, Some(sent)) = (taken, self.ways.get_mut(usize::from(ways.vertex))) {
-            *sent = SentWays::of(ways);
+        if taken {
+            self.sent.set_ways(ways);
         }
         taken
     }
@@ -364,7 +353,7 @@ impl<const V: usize> Reporter<V> {
         let (vertices, edges) = (map.vertices().len() as u8, map.edges().count() as u16);
         let taken = self.send(&Message::Map { vertices, edges, digest: map_digest(map, filter.darts()) }, send);
         if taken {
-            self.vertices = vertices;
+            self.sent.set_vertices(vertices);
         }
         taken
     }
@@ -391,51 +380,12 @@ impl<const V: usize> Reporter<V> {
         Some(kind)
     }
 
-    /// The edges from a vertex to itself or a later one that differ from what was sent.
-    fn flips(&self, row: &Row) -> u64 {
-        let sent = self.neighbours.get(usize::from(row.vertex)).copied().unwrap_or(0);
-        (row.neighbours ^ sent) & !bit(row.vertex).wrapping_sub(1)
-    }
-
-    fn sent_label(&self, vertex: u8) -> Option<(u16, u32)> {
-        if vertex < self.vertices { self.labels.get(usize::from(vertex)).copied() } else { None }
-    }
-
     fn note_remapped(&mut self, remapped: &Remapped) {
-        let labelled = bit(self.vertices).wrapping_sub(1);
-        remapped.apply(&mut self.labels, &mut self.neighbours, labelled);
-        remapped.apply_to_ways(&mut self.ways, SentWays::NONE, |ways| ways.remap(remapped));
-        self.vertices = remapped.count(self.vertices).min(V as u8);
+        self.sent.remap(remapped);
         self.location = self.location.and_then(|location| location.remapped(remapped));
         if let Some(belief) = &mut self.belief {
             belief.remap(remapped);
         }
-    }
-
-    fn note_label(&mut self, row: &Row) {
-        if let Some(label) = self.labels.get_mut(usize::from(row.vertex)) {
-            *label = (row.radius_mm, row.visits);
-        }
-    }
-
-    fn note_edge(&mut self, a: u8, b: u8, present: bool) {
-        for (from, to) in [(a, b), (b, a)] {
-            if let Some(row) = self.neighbours.get_mut(usize::from(from)) {
-                *row = if present { *row | bit(to) } else { *row & !bit(to) };
-            }
-        }
-    }
-
-    /// Removes the vertices from `vertices` on with their edges, as the listener does.
-    fn forget_from(&mut self, vertices: u8) {
-        let kept = bit(vertices).wrapping_sub(1);
-        for (row, vertex) in self.neighbours.iter_mut().zip(0u8..) {
-            *row = if vertex < vertices { *row & kept } else { 0 };
-        }
-        for (ways, vertex) in self.ways.iter_mut().zip(0u8..) {
-            if vertex < vertices { ways.forget_from(vertices) } else { *ways = SentWays::NONE }
-        }
-        self.vertices = vertices;
     }
 }
 
@@ -443,11 +393,6 @@ impl<const V: usize> Default for Reporter<V> {
     fn default() -> Self {
         Self::new()
     }
-}
-
-/// The bit of a vertex in a row, 0 from vertex 64 on, so that `bit(v).wrapping_sub(1)` has every bit below `v`.
-pub(in crate::wire) fn bit(vertex: u8) -> u64 {
-    1u64.checked_shl(u32::from(vertex)).unwrap_or(0)
 }
 
 /// The transmit queue has no room for a message.
