@@ -53,7 +53,11 @@ fn plan_lists_the_places_of_a_map_draws_them_and_warns() {
     assert!(std::fs::read_to_string(&svg).unwrap().contains("2 places, 1 edges"));
     let text = printed(&toposlam(&["plan", &map, "--start", "-0.85,3"]));
     assert!(text.contains("warning: the body does not fit at the start"), "{text}");
-    assert!(printed(&toposlam(&["plan", "hshape"])).contains("warning: 40 places"));
+    // Nine by nine corridors 2 m wide.
+    let cell = |x: u32, y: u32| if x % 12 < 4 || y % 12 < 4 { '.' } else { '#' };
+    let rows: Vec<String> = (0..100).map(|y| (0..100).map(|x| cell(x, y)).collect()).collect();
+    std::fs::write(file("grid.txt"), format!("cell_mm 500\n{}\n", rows.join("\n"))).unwrap();
+    assert!(printed(&toposlam(&["plan", &file("grid.txt")])).contains("warning: 81 places"));
     assert!(complaint(&toposlam(&["plan", &map, "--start", "-2,3"])).contains("in a wall"));
     std::fs::write(file("map.yaml"), "image: map.pgm\nresolution: -0.05\n").unwrap();
     let error = complaint(&toposlam(&["plan", &map]));
