@@ -100,11 +100,7 @@ impl Body {
 }
 
 /// Whether the gap between the obstacles on both sides is narrower than the body, or these are the walls of a corner.
-fn is_narrow<const SONARS: usize>(
-    scan: &RingScan<'_, SONARS>,
-    ahead: Option<Obstacle>,
-    body_radius_mm: u16,
-) -> bool {
+fn is_narrow<const SONARS: usize>(scan: &RingScan<'_, SONARS>, ahead: Option<Obstacle>, body_radius_mm: u16) -> bool {
     let within = |bearing_mrad: i16| (350..=AHEAD_MRAD).contains(&bearing_mrad);
     let left = scan.nearest(within);
     let right = scan.nearest(|bearing_mrad| within(bearing_mrad.saturating_neg()));
