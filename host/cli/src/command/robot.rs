@@ -59,8 +59,8 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     while arguments.places == 0 || exploration.places() < arguments.places {
         exploration.advance();
         let board = exploration.board();
-        let heard = broadcast.exchange(&board.sent);
-        board.received.extend(heard);
+        let received = broadcast.exchange(&board.sent);
+        board.received.extend(received);
         next_frame += frame_time;
         std::thread::sleep(next_frame.saturating_duration_since(Instant::now()));
     }

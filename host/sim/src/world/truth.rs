@@ -353,7 +353,7 @@ mod tests {
     }
 
     #[test]
-    fn every_point_of_every_way_is_as_far_from_two_obstacles() {
+    fn every_point_of_an_edge_is_equidistant_from_two_obstacles() {
         for (name, _) in Plan::BUILT_IN {
             let plan = Plan::built_in(name).unwrap();
             let map = truth(&plan);

@@ -217,7 +217,7 @@ mod tests {
     }
 
     #[test]
-    fn a_plan_with_a_fault_says_where() {
+    fn an_invalid_plan_is_rejected_with_its_error() {
         assert_eq!(Plan::parse("#S#").unwrap_err(), PlanError::Header);
         assert_eq!(Plan::parse("cell_mm 9\n#S#").unwrap_err(), PlanError::Header);
         assert_eq!(Plan::parse("cell_mm 250\n###").unwrap_err(), PlanError::NoFreeSpace);
@@ -238,7 +238,7 @@ mod tests {
     }
 
     #[test]
-    fn the_outside_is_wall() {
+    fn points_outside_the_plan_are_wall() {
         let plan = Plan::parse("cell_mm 500\nS").unwrap();
         let is_wall = |x_mm, y_mm| plan.is_wall_at(Point::new(x_mm, y_mm));
         assert!(is_wall(-1.0, 100.0) && is_wall(100.0, 600.0) && is_wall(600.0, 100.0) && !is_wall(100.0, 100.0));
@@ -246,7 +246,7 @@ mod tests {
     }
 
     #[test]
-    fn every_built_in_plan_is_readable_and_the_robot_fits_at_its_start() {
+    fn every_built_in_plan_parses_and_the_robot_fits_at_its_start() {
         for (name, text) in Plan::BUILT_IN {
             let plan = Plan::parse(text).unwrap_or_else(|error| panic!("{name}: {error}"));
             assert!(plan.fits(plan.start(), Limits::default().body_radius_mm), "{name}");
