@@ -18,6 +18,7 @@ mod machine;
 mod missing;
 pub(crate) mod monitor;
 mod on_graph;
+pub(crate) mod plan;
 #[cfg(feature = "recording")]
 pub(crate) mod play;
 #[cfg(feature = "mqtt")]

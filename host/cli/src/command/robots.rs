@@ -40,7 +40,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     allow_many_connections().context("opening many connections")?;
     let mut streams = Vec::new();
     for (plan, seed) in LIVES {
-        let recorded = RecordedStream::record(&load_plan(plan)?, seed, arguments.frames as usize)?;
+        let recorded = RecordedStream::record(&load_plan(plan, None)?, seed, arguments.frames as usize)?;
         eprintln!("recorded {plan}: {} ring frames, {} bytes", recorded.frames(), recorded.bytes());
         streams.push(recorded);
     }
