@@ -154,7 +154,8 @@ fn driven_mm(poses: &[Option<Pose>]) -> f64 {
 
 impl fmt::Display for Revisits {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let share = |part: usize, of: usize| if of == 0 { "-".to_owned() } else { format!("{} %", 100 * part / of) };
+        let share =
+            |part: usize, of: usize| (100 * part).checked_div(of).map_or("-".to_owned(), |share| format!("{share} %"));
         writeln!(
             f,
             "revisits by the poses: {:.0} m driven, {} places at {} spots",
