@@ -248,10 +248,10 @@ impl<const V: usize> RoutePlanner<V> {
                 here.and_then(|here| self.towards(target, &here)).or_else(|| self.any(exits))
             }
         }?;
-        if let Some((way, here)) = here.and_then(|here| Some((here.way(exit)?, here))) {
-            if let (Some(vertex), Some(bearing)) = (here.darts.vertex(way), here.darts.bearing(way)) {
-                self.chosen = RefusedWay { vertex, bearing, times: 1 };
-            }
+        if let Some((way, here)) = here.and_then(|here| Some((here.way(exit)?, here)))
+            && let (Some(vertex), Some(bearing)) = (here.darts.vertex(way), here.darts.bearing(way))
+        {
+            self.chosen = RefusedWay { vertex, bearing, times: 1 };
         }
         exits.as_slice().get(exit).copied()
     }
