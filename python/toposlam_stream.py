@@ -478,7 +478,7 @@ class Health:
 DEAD = "dead"
 """The echo of a dead sensor."""
 SILENCE = "silence"
-"""The echo of a sensor that hears nothing."""
+"""The echo of a sensor that measures no echo."""
 Echo = Union[int, str]
 """A range in millimetres, `SILENCE` or `DEAD`."""
 
@@ -870,7 +870,7 @@ class Arrival(enum.Enum):
 
 
 @dataclass(frozen=True)
-class Heard:
+class Received:
     """A message or a request, and how its frame follows on the previous ones."""
 
     sequence: int
@@ -904,7 +904,7 @@ class Damaged:
         return self.error.value
 
 
-Event = Union[Heard, Damaged]
+Event = Union[Received, Damaged]
 
 
 @dataclass
@@ -950,7 +950,7 @@ class Decoder:
         if frames:
             frames[0] = self._begun + frames[0]
             self._begun = b""
-        # One byte more than the longest frame tells that a frame is too long.
+        # One byte more than the longest frame shows that a frame is too long.
         self._begun = (self._begun + rest)[: _RAW_BYTES_MAX + 2]
         return [self._judge(frame) for frame in frames if frame]
 
@@ -980,17 +980,17 @@ class Decoder:
         except (_UnknownPayload, IndexError):
             end = None
         if end != len(body):
-            # A newer sender's messages must not look like lost frames; after a gap the next message tells of it.
+            # A newer sender's messages must not look like lost frames; after a gap the next message reports it.
             if self._last_sequence is not None and (self._last_sequence + 1) & 0xFFFF == sequence:
                 self._last_sequence = sequence
             return self._damaged(DecodeError.UNKNOWN_MESSAGE)
-        return self._heard(sequence, message)
+        return self._received(sequence, message)
 
     def _damaged(self, error: DecodeError, version: Optional[int] = None) -> Damaged:
         self._count(_COUNTER_OF[error])
         return Damaged(error, version)
 
-    def _heard(self, sequence: int, message: Union[Message, Request]) -> Heard:
+    def _received(self, sequence: int, message: Union[Message, Request]) -> Received:
         has_restarted = False
         if isinstance(message, Hello):
             has_restarted = self._last_boot is not None and self._last_boot != message.boot
@@ -1014,7 +1014,7 @@ class Decoder:
         if arrival is not Arrival.LATE:
             self._last_sequence = sequence
         self._count("messages")
-        return Heard(sequence, arrival, lost, message)
+        return Received(sequence, arrival, lost, message)
 
     def _count(self, name: str, more: int = 1) -> None:
         setattr(self.counters, name, min(getattr(self.counters, name) + more, _COUNT_MAX))
@@ -1344,11 +1344,11 @@ class Client:
     A request without a reply in time is sent again; the robot executes it once.
     """
 
-    def __init__(self, line: Line, heard: Callable[[Event], object] = lambda event: None) -> None:
+    def __init__(self, line: Line, on_event: Callable[[Event], object] = lambda event: None) -> None:
         self.line = line
         self.decoder = Decoder()
         self.replica = MapReplica()
-        self.heard = heard
+        self.on_event = on_event
         """Called with every event after it was applied to the replica."""
         self.timeout_s = 1.0
         self.attempts = 5
@@ -1361,7 +1361,7 @@ class Client:
         events = self.decoder.feed(self.line.read())
         for event in events:
             self.replica.apply(event)
-            self.heard(event)
+            self.on_event(event)
         return events
 
     def request(self, command: AnyCommand) -> AnyOutcome:
@@ -1373,7 +1373,7 @@ class Client:
             deadline = time.monotonic() + self.timeout_s
             while time.monotonic() < deadline:
                 for event in self.listen():
-                    if isinstance(event, Heard) and isinstance(event.message, Reply) and event.message.request == request.id:
+                    if isinstance(event, Received) and isinstance(event.message, Reply) and event.message.request == request.id:
                         return event.message.outcome
         raise NoReply(f"no reply to {self.attempts} requests: {command}")
 
@@ -1391,7 +1391,7 @@ def main() -> int:
             while True:
                 for event in decoder.feed(line.read()):
                     print(json_line(to_json(event)))
-                    if isinstance(event, Heard) and isinstance(event.message, Hello) and event.message.complaint() != complaint:
+                    if isinstance(event, Received) and isinstance(event.message, Hello) and event.message.complaint() != complaint:
                         complaint = event.message.complaint()
                         print(complaint or "the robot is understood", file=sys.stderr)
                 sys.stdout.flush()

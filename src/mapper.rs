@@ -116,6 +116,9 @@ impl<const SONARS: usize, const V: usize, F: Filter<V>> Mapper<SONARS, V, F> {
     #[inline(never)]
     pub fn observe(&mut self, frame: &RingFrame<SONARS>, passage: Passage) -> Option<(Place, Update)> {
         if let Some(place) = self.detector.observe(frame) {
+            if passage.returns {
+                return None;
+            }
             let starts_sequence = core::mem::take(&mut self.starts_sequence);
             self.refinement_steps = 0;
             let Passage { exit, travel_frames, .. } = passage;
@@ -151,6 +154,11 @@ impl<const SONARS: usize, const V: usize, F: Filter<V>> Mapper<SONARS, V, F> {
     /// Announces that the robot has not left the last place; see [`PlaceDetector::hold_place`].
     pub fn hold_place(&mut self) {
         self.detector.hold_place();
+    }
+
+    /// Announces that the robot is not on the Voronoi graph; see [`PlaceDetector::forget_sightings`].
+    pub fn forget_sightings(&mut self) {
+        self.detector.forget_sightings();
     }
 
     /// The best map.

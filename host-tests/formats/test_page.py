@@ -42,11 +42,11 @@ def setUpModule() -> None:
 
 
 class Program:
-    """A `toposlam` that goes on until it is stopped; `told` is the last word of its first line."""
+    """A `toposlam` that runs until it is stopped; `address` is the last word of its first line."""
 
     def __init__(self, *arguments: str) -> None:
         self.process = subprocess.Popen([TOPOSLAM, *arguments], stdout=subprocess.PIPE, text=True)
-        self.told = self.process.stdout.readline().split()[-1]
+        self.address = self.process.stdout.readline().split()[-1]
 
     def stop(self) -> None:
         self.process.kill()
@@ -106,8 +106,8 @@ class Page(unittest.TestCase):
         return WebDriverWait(self.browser, FOREVER_S, poll_frequency=0.1).until(lambda _: condition(), what)
 
     def test_it_draws_the_map_of_a_robot_that_explores(self) -> None:
-        line = self.start(robot()).told
-        self.browser.get(self.start(serve(line)).told)
+        line = self.start(robot()).address
+        self.browser.get(self.start(serve(line)).address)
         self.wait("ten vertices", lambda: self.count("#map .vertex") >= 10)
         if SCREENSHOT:
             time.sleep(0.5)
@@ -115,11 +115,11 @@ class Page(unittest.TestCase):
         # From here on it stands, so that its map stays as it is while it is compared.
         command(line, "pause", "on")
         # Where it is comes round less often than its map.
-        heard = self.wait("a place", lambda: text if "at vertex" in (text := command(line, "map")) else None)
-        vertices, edges = map(int, re.search(r"map: (\d+) vertices, (\d+) edges", heard).groups())
-        radii = [int(radius) for radius in re.findall(r"vertex +\d+: radius +(\d+) mm", heard)]
-        names = sorted(re.search(r"edges: (.*)", heard).group(1).split())
-        here = re.search(r"at vertex (\d+)", heard).group(1)
+        received = self.wait("a place", lambda: text if "at vertex" in (text := command(line, "map")) else None)
+        vertices, edges = map(int, re.search(r"map: (\d+) vertices, (\d+) edges", received).groups())
+        radii = [int(radius) for radius in re.findall(r"vertex +\d+: radius +(\d+) mm", received)]
+        names = sorted(re.search(r"edges: (.*)", received).group(1).split())
+        here = re.search(r"at vertex (\d+)", received).group(1)
         self.assertGreaterEqual(vertices, 10)
 
         def is_drawn() -> bool:
@@ -129,13 +129,13 @@ class Page(unittest.TestCase):
                 and self.browser.execute_script("return [...document.querySelectorAll('#map .here')].map((v) => v.dataset.vertex)") == [here]
             )
 
-        self.wait(heard, is_drawn)
+        self.wait(received, is_drawn)
         self.assertEqual(len(names), edges)
         labels = self.browser.execute_script("return [...document.querySelectorAll('#map .label')].map((label) => label.textContent)")
         self.assertEqual([int(label.split(" mm")[0]) for label in labels], radii)
         self.assertEqual(self.count("#table tr"), vertices)
         self.assertEqual(self.banners(), set())
-        frontiers = re.search(r"frontiers: (.*)", heard)
+        frontiers = re.search(r"frontiers: (.*)", received)
         frontiers = frontiers.group(1).split() if frontiers else []
         drawn = self.browser.execute_script("return [...document.querySelectorAll('#map .frontier')].map((f) => f.dataset.way)")
         self.assertEqual(sorted(drawn), sorted(frontiers))
@@ -155,15 +155,15 @@ class Page(unittest.TestCase):
 
     def test_it_says_when_the_robot_or_the_server_is_gone_and_goes_on_when_they_are_back(self) -> None:
         first_robot = self.start(robot())
-        first_server = self.start(serve(first_robot.told))
-        line, address = first_robot.told.removeprefix("tcp:"), first_server.told.removeprefix("http://").rstrip("/")
-        self.browser.get(first_server.told)
+        first_server = self.start(serve(first_robot.address))
+        line, address = first_robot.address.removeprefix("tcp:"), first_server.address.removeprefix("http://").rstrip("/")
+        self.browser.get(first_server.address)
         self.wait("a robot", lambda: self.text("connection") == "connected" and self.count("#map .vertex") > 0)
         self.assertEqual(self.banners(), set())
         first_robot.stop()
         self.wait("the line is cut", lambda: self.banners() == {"banner-line"})
         self.assertIn("No line to the robot: ", self.text("banner-line"))
-        self.assertGreater(self.count("#map .vertex"), 0, "what was heard stays")
+        self.assertGreater(self.count("#map .vertex"), 0, "what was received stays")
         self.start(robot(line))
         self.wait("the line is back", lambda: self.banners() == set())
         first_server.stop()
@@ -177,7 +177,7 @@ class Page(unittest.TestCase):
         ring = bytes([10, 7, 4]) + varint(502) + bytes([1, 0]) + varint(1002)
         said = frame(0, hello(99)) + frame(1, bytes([8, 0, 5])) + bytes(damaged) + frame(3, ring)
         with socket.create_server(("127.0.0.1", 0)) as port:
-            self.browser.get(self.start(serve(f"tcp:127.0.0.1:{port.getsockname()[1]}")).told)
+            self.browser.get(self.start(serve(f"tcp:127.0.0.1:{port.getsockname()[1]}")).address)
             with port.accept()[0] as robots_end:
                 robots_end.sendall(said)
                 self.wait("another version", lambda: self.banners() == {"banner-version"})
@@ -201,17 +201,17 @@ class Page(unittest.TestCase):
             program.kill()
 
     def test_a_tab_that_slept_shows_the_newest_state_and_the_colours_are_those_that_the_system_prefers(self) -> None:
-        self.browser.get(self.start(serve(self.start(robot()).told)).told)
+        self.browser.get(self.start(serve(self.start(robot()).address)).address)
         self.wait("a robot", lambda: self.count("#map .vertex") > 0)
-        heard = lambda: int(re.search(r"frames heard(\d+)", self.text("health")).group(1))
+        received = lambda: int(re.search(r"frames received(\d+)", self.text("health")).group(1))
         self.browser.minimize_window()
-        asleep = heard()
+        asleep = received()
         self.browser.execute_cdp_cmd("Page.setWebLifecycleState", {"state": "frozen"})
         time.sleep(2)
-        self.assertLess(heard(), asleep + 100, "nothing is drawn that is not seen")
+        self.assertLess(received(), asleep + 100, "nothing is drawn that is not seen")
         self.browser.execute_cdp_cmd("Page.setWebLifecycleState", {"state": "active"})
         self.browser.set_window_rect(0, 0, *WINDOW)
-        self.wait("it goes on", lambda: heard() > asleep + 500)
+        self.wait("it continues", lambda: received() > asleep + 500)
         self.assertEqual(self.banners(), set())
         self.addCleanup(self.browser.execute_cdp_cmd, "Emulation.setEmulatedMedia", {"features": []})
         grounds = set()

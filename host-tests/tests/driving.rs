@@ -69,6 +69,42 @@ fn walls_detected_at_a_flat_angle_are_not_places() {
     assert!(report.phantom + report.doubled <= 1, "{report}");
 }
 
+/// Two rooms beside a corridor of 1.6 m, joined by gaps of `gap_mm` in a wall of `thickness_mm`; cells of 50 mm.
+fn rooms_with_gaps(gap_mm: usize, thickness_mm: usize, aside_mm: usize) -> Plan {
+    let mut rows = vec![vec![b'#'; 160]; 100];
+    let mut clear = |x: std::ops::Range<usize>, y: std::ops::Range<usize>| {
+        y.for_each(|row| rows[row][x.clone()].fill(b'.'));
+    };
+    let (gap, thickness, aside) = (gap_mm / 50, thickness_mm / 50, aside_mm / 50);
+    clear(2..70, 10..42);
+    clear(70..70 + thickness, 10 + aside..10 + aside + gap);
+    clear(70 + thickness..150, 6..40);
+    clear(14..44, 42..98);
+    rows[26][20] = b'S';
+    let rows: Vec<String> = rows.into_iter().map(|row| String::from_utf8(row).unwrap()).collect();
+    Plan::parse(&format!("cell_mm 50\n{}\n", rows.join("\n"))).unwrap()
+}
+
+#[test]
+fn a_robot_does_not_touch_the_walls_of_gaps_and_does_not_enter_those_narrower_than_its_body() {
+    let (mut frames, mut touched) = (0, 0);
+    for (seed, gap_mm) in (0..12).map(|seed| (seed, [250, 300, 400, 550][seed as usize % 4])) {
+        let plan = rooms_with_gaps(gap_mm, [100, 350][seed as usize / 4 % 2], [0, 300, 550][seed as usize / 4 % 3]);
+        let mut buffer = [0; SNAPSHOT_BYTES];
+        let mut exploration = Exploration::start(&plan, RobotModel::default(), seed, &mut buffer).unwrap();
+        let mut farthest_mm = 0.0_f64;
+        while exploration.places() < 30 {
+            assert!(exploration.frames() < 15_000, "after {} places, {gap_mm} mm", exploration.places());
+            exploration.advance();
+            farthest_mm = farthest_mm.max(exploration.rover().position().x_mm);
+        }
+        frames += exploration.frames();
+        touched += exploration.rover().bumps();
+        assert!(gap_mm > 300 || farthest_mm < 3500.0, "a gap of {gap_mm} mm: at {farthest_mm}");
+    }
+    assert!(u64::from(touched) * 1000 <= frames, "{touched} of {frames} frames at a wall");
+}
+
 #[test]
 fn exits_ways_and_travel_times_are_right() {
     let Outcome { hints, .. } = explore("ladder", SonarModel::default(), 2, 60);

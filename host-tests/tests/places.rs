@@ -114,7 +114,7 @@ fn the_places_of_the_real_recording_have_radii_that_fit_the_room() {
         return;
     };
     let ring = Ring::parse(include_str!("../../host/eval/rings/scitos-g5.toml")).unwrap();
-    let frames = ring.read(recording).unwrap();
+    let frames = ring.read(recording, None).unwrap().frames;
     assert_eq!(frames.len(), 5456);
     let mut detector = PlaceDetector::new();
     detector.start(PlaceConfig::DEFAULT, ring.geometry()).unwrap();

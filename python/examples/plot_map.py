@@ -18,13 +18,13 @@ from pathlib import Path
 
 import matplotlib
 
-from toposlam_stream import DEAD, SILENCE, Decoder, Event, Heard, Line, MapReplica, Remapped, WayId, open_line
+from toposlam_stream import DEAD, SILENCE, Decoder, Event, Received, Line, MapReplica, Remapped, WayId, open_line
 
 SECONDS_A_PICTURE = 0.2
 STUB = 0.35
 """The length of a frontier, a way that nobody has driven."""
 SILENT_MM = 6000
-"""Where a sonar that hears nothing is drawn."""
+"""Where a sonar without an echo is drawn."""
 
 
 class Arrangement:
@@ -141,7 +141,7 @@ def listen(line: Line, decoder: Decoder, replica: MapReplica, arrangement: Arran
     except EOFError:
         return False
     for event in events:
-        if isinstance(event, Heard) and isinstance(event.message, Remapped):
+        if isinstance(event, Received) and isinstance(event.message, Remapped):
             # The vertices that are on the paper, before the map takes their new numbers.
             arrangement.remap(event.message)
         replica.apply(event)

@@ -34,7 +34,7 @@ from toposlam_stream import (
     Edge,
     Encoder,
     Exploration,
-    Heard,
+    Received,
     Hello,
     GoalStatus,
     GoalState,
@@ -91,7 +91,7 @@ def replica_json(replica: MapReplica) -> dict[str, Any]:
 def plain(message: Any) -> Any:
     if message is None:
         return None
-    event = to_json(Heard(0, Arrival.FIRST, 0, message))
+    event = to_json(Received(0, Arrival.FIRST, 0, message))
     return {name: value for name, value in event.items() if name not in ("event", "sequence")}
 
 
@@ -216,15 +216,15 @@ class Robustness(unittest.TestCase):
     def test_an_intact_frame_of_any_payload_is_one_message_or_one_error(self) -> None:
         draw = random.Random(2)
         for version, head, requests in ((2, b"", False), (130, b"\7", True), (130, b"\7\7", True)):
-            heard = []
+            received = []
             for _ in range(3000):
                 rest = bytes(draw.choice((0, 1, 2, 127, 128, 255)) for _ in range(draw.randrange(30)))
                 body = bytes([version, 0, 0]) + head + bytes([draw.randrange(20)]) + rest
                 raw = body + zlib.crc32(body).to_bytes(4, "little")
                 frame = b"".join(bytes([len(block) + 1]) + block for block in raw.split(b"\0")) + b"\0"
                 (event,) = Decoder(requests).feed(frame)
-                heard.append(type(event))
-            self.assertEqual(set(heard), {Heard, Damaged})
+                received.append(type(event))
+            self.assertEqual(set(received), {Received, Damaged})
 
     def test_an_endless_frame_is_not_buffered(self) -> None:
         decoder = Decoder()
@@ -306,16 +306,16 @@ class Lines(unittest.TestCase):
 
     def test_a_file_of_raw_bytes_is_a_read_only_line_with_an_end(self) -> None:
         with tempfile.TemporaryDirectory() as directory:
-            file = Path(directory, "heard")
+            file = Path(directory, "received")
             file.write_bytes(exploration())
-            heard = b""
+            received = b""
             with open_line(str(file)) as line:
                 with self.assertRaises(OSError):
                     line.write(b"x")
                 with self.assertRaises(EOFError):
                     while True:
-                        heard += line.read()
-        self.assertEqual(heard, exploration())
+                        received += line.read()
+        self.assertEqual(received, exploration())
 
     def test_a_line_that_cannot_be_opened_prints_an_error_without_a_traceback(self) -> None:
         for name in ("tcp:127.0.0.1", "tcp:127.0.0.1:1", "/no/such/port"):
@@ -342,10 +342,10 @@ class Lines(unittest.TestCase):
         with open_line(os.ttyname(port)) as line:
             self.assertEqual(line.read(), b"")
             os.write(robot, b"abc\0")
-            heard = b""
-            while len(heard) < 4:
-                heard += line.read()
-            self.assertEqual(heard, b"abc\0")
+            received = b""
+            while len(received) < 4:
+                received += line.read()
+            self.assertEqual(received, b"abc\0")
             line.write(b"\1\2")
             self.assertEqual(os.read(robot, 2), b"\1\2")
         os.close(robot)
@@ -366,14 +366,14 @@ class Commanding(unittest.TestCase):
                 if len(asked) > 1:
                     to_client.append(b"\0" + mouth.encode(Reply(event.message.id, Outcome.Refused(Refusal.NO_ROUTE))))
 
-        heard = []
-        client = Client(Line(lambda: to_client.pop(0) if to_client else b"", answer, lambda: None), heard.append)
+        received = []
+        client = Client(Line(lambda: to_client.pop(0) if to_client else b"", answer, lambda: None), received.append)
         client.timeout_s = 0.05
         self.assertEqual(client.request(Command.GoTo(3)), Outcome.Refused(Refusal.NO_ROUTE))
         self.assertEqual(len(asked), 2)
         self.assertEqual(asked[0], asked[1], "the repeated request is identical, so that it is executed once")
         self.assertEqual(client.replica.goal_status, GoalStatus(3, GoalState.ACTIVE))
-        self.assertTrue(any(isinstance(event, Damaged) for event in heard))
+        self.assertTrue(any(isinstance(event, Damaged) for event in received))
         client.request(Command.Explore())
         self.assertNotEqual(asked[2].id, asked[0].id)
 
@@ -421,7 +421,7 @@ class Example(unittest.TestCase):
     @needs("matplotlib", importlib.util.find_spec("matplotlib") is not None)
     def test_the_map_of_a_recording_is_plotted(self) -> None:
         with tempfile.TemporaryDirectory() as directory:
-            recording, picture = Path(directory, "heard"), Path(directory, "map.png")
+            recording, picture = Path(directory, "received"), Path(directory, "map.png")
             recording.write_bytes(exploration())
             printed = script(str(PYTHON / "examples/plot_map.py"), str(recording), "--save", str(picture))
             self.assertEqual(printed.returncode, 0, printed.stderr)
@@ -448,7 +448,7 @@ class Example(unittest.TestCase):
 
     def test_the_rate_of_decoding_is_measured(self) -> None:
         with tempfile.TemporaryDirectory() as directory:
-            recording = Path(directory, "heard")
+            recording = Path(directory, "received")
             recording.write_bytes(exploration())
             printed = script(str(PYTHON / "examples/decode_rate.py"), str(recording))
         self.assertRegex(printed.stdout, r"MB/s, \d+ frames/s\n")

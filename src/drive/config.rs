@@ -18,6 +18,9 @@ pub struct DriveConfig {
     pub arrival_tolerance_mm: u16,
     /// Minimum range ahead, in millimetres. Default 250. The robot turns away from a nearer obstacle.
     pub clearance_mm: u16,
+    /// Radius of the smallest circle round the centre of the ring that contains the robot, in millimetres. Default 150. The robot does not
+    /// enter a gap that is less than 60 mm wider than this circle, and turns in place wherever it can drive.
+    pub body_radius_mm: u16,
     /// Maximum duration of a manoeuvre in ring frames, at least 1. Default 100. After it the drive is lost and searches for
     /// the graph. An edge may take twenty times as long.
     pub timeout_frames: u16,
@@ -29,6 +32,7 @@ impl DriveConfig {
         with_look_ahead_mm, look_ahead_mm: u16;
         with_arrival_tolerance_mm, arrival_tolerance_mm: u16;
         with_clearance_mm, clearance_mm: u16;
+        with_body_radius_mm, body_radius_mm: u16;
         with_timeout_frames, timeout_frames: u16;
     }
 
@@ -38,11 +42,18 @@ impl DriveConfig {
         look_ahead_mm: 400,
         arrival_tolerance_mm: 40,
         clearance_mm: 250,
+        body_radius_mm: 150,
         timeout_frames: 100,
     };
 
-    pub(crate) const UNSET: Self =
-        Self { speed_permille: 0, look_ahead_mm: 0, arrival_tolerance_mm: 0, clearance_mm: 0, timeout_frames: 0 };
+    pub(crate) const UNSET: Self = Self {
+        speed_permille: 0,
+        look_ahead_mm: 0,
+        arrival_tolerance_mm: 0,
+        clearance_mm: 0,
+        body_radius_mm: 0,
+        timeout_frames: 0,
+    };
 
     /// Whether every field is in its range.
     pub(super) fn check(&self) -> Result<(), ConfigError> {

@@ -1,5 +1,6 @@
 //! Drives from one place to the next: along an edge, to the meet point, and out by the chosen exit.
 
+use super::body::{Body, widest_room_mrad};
 use super::voronoi::{Sector, edge_heading_mrad, meet_point_offset_mm};
 use super::{DriveConfig, VelocityCommand};
 use crate::bearing::{HALF_TURN_MRAD, counter_clockwise_mrad, rotated, turn_mrad};
@@ -101,6 +102,11 @@ pub(super) struct LocalPlanner {
     /// The degree of the place by the detector.
     degree: Option<u8>,
     departure: Departure,
+    /// Whether the robot turned back on its way to the next place.
+    is_returning: bool,
+    body: Body,
+    /// The speed of the last velocity command.
+    speed_permille: u16,
     faults: FaultCounters,
 }
 
@@ -116,6 +122,9 @@ impl LocalPlanner {
             openings: 0,
             degree: None,
             departure: Departure::UNKNOWN,
+            is_returning: false,
+            body: Body::new(),
+            speed_permille: 0,
             faults: FaultCounters::new(),
         }
     }
@@ -148,12 +157,20 @@ impl LocalPlanner {
     pub(super) fn passage(&self) -> Passage {
         let entry_mrad = (self.state == DriveState::Approach).then_some(self.entry_mrad);
         let Departure { is_known, exit_mrad, driven_permille } = self.departure;
+        if self.is_returning {
+            return Passage { returns: true, entry_mrad, ..Passage::UNKNOWN };
+        }
         if !is_known {
             return Passage { entry_mrad, ..Passage::UNKNOWN };
         }
         let frames = driven_permille.saturating_add(500) / 1000;
         let travel_frames = Some(frames.clamp(1, u16::MAX.into()) as u16);
-        Passage { exit: Exit::from_bearing_mrad(exit_mrad).ok(), travel_frames, entry_mrad }
+        Passage { exit: Exit::from_bearing_mrad(exit_mrad).ok(), travel_frames, entry_mrad, returns: false }
+    }
+
+    /// Whether the robot is not on its way along the graph: it turns away from a wall, or stands in a gap that is too narrow for it.
+    pub(super) const fn is_stuck(&self) -> bool {
+        matches!(self.state, DriveState::Recover) || !self.body.is_free()
     }
 
     pub(super) const fn faults(&self) -> &FaultCounters {
@@ -167,6 +184,22 @@ impl LocalPlanner {
         }
         self.degree = degree;
         self.departure = Departure::UNKNOWN;
+        self.is_returning = false;
+        self.enter(DriveState::ChooseExit);
+    }
+
+    /// Whether a frame in which the detector reports a place, or still is at it, ends the way back to the place before.
+    pub(super) fn has_returned(&self, is_at_place: bool) -> bool {
+        self.is_returning && is_at_place && matches!(self.state, DriveState::FollowEdge | DriveState::Approach)
+    }
+
+    /// The robot is back at the place that was reported last. Bearings are relative to the way by which it first came.
+    pub(super) fn arrive_again(&mut self) {
+        let came_mrad = if self.state == DriveState::Approach { self.entry_mrad } else { HALF_TURN_MRAD };
+        self.entry_mrad = rotated(came_mrad, -i32::from(self.departure.exit_mrad));
+        self.degree = None;
+        self.departure = Departure::UNKNOWN;
+        self.is_returning = false;
         self.enter(DriveState::ChooseExit);
     }
 
@@ -180,6 +213,7 @@ impl LocalPlanner {
     /// Discards what is known of the present place and edge.
     pub(super) fn forget_edge(&mut self) {
         self.departure = Departure::UNKNOWN;
+        self.is_returning = false;
         self.enter(DriveState::FollowEdge);
     }
 
@@ -195,7 +229,13 @@ impl LocalPlanner {
         self.frames = self.frames.saturating_add(1);
         self.rotation_mrad = rotation_mrad;
         let obstacles = scan.obstacles();
+        self.body.look(scan, nearest_ahead(scan), self.config.body_radius_mm);
+        let is_held = self.body.is_held(scan, self.speed_permille, self.config.body_radius_mm);
         let velocity = match self.state {
+            _ if is_held => self.give_up(scan),
+            DriveState::FollowEdge | DriveState::Approach | DriveState::Depart if self.body.is_blocked() => {
+                self.turn_back(scan)
+            }
             DriveState::FollowEdge => self.follow_edge(scan, &obstacles, is_at_place),
             DriveState::Approach => self.approach(scan, &obstacles),
             DriveState::ChooseExit => self.choose_exit(scan, &obstacles, choose),
@@ -205,12 +245,16 @@ impl LocalPlanner {
             DriveState::Stopped => VelocityCommand::STOP,
         };
         self.departure.driven_permille = self.departure.driven_permille.saturating_add(velocity.speed_permille.into());
+        self.speed_permille = velocity.speed_permille;
         velocity
     }
 
     fn enter(&mut self, state: DriveState) {
         self.state = state;
         self.frames = 0;
+        if !matches!(state, DriveState::FollowEdge | DriveState::Depart | DriveState::Approach) {
+            self.body.forget_motion();
+        }
     }
 
     fn is_timed_out(&self) -> bool {
@@ -353,25 +397,34 @@ impl LocalPlanner {
     }
 
     fn recover<const SONARS: usize>(&mut self, scan: &RingScan<'_, SONARS>) -> VelocityCommand {
-        // Without odometry, a free range ahead is the only sign that the turn is complete.
+        self.target_mrad = rotated(self.target_mrad, self.rotation_mrad);
         let limit_mm = self.config.clearance_mm.saturating_mul(2);
         let is_free = nearest_ahead(scan).is_none_or(|ahead| ahead.range_mm > limit_mm);
-        if is_free && self.frames > 5 || self.is_timed_out() {
+        let faces = i32::from(self.target_mrad).abs() <= facing_mrad(scan);
+        if is_free && faces && self.body.is_free() || self.is_timed_out() {
             self.enter(DriveState::FollowEdge);
         }
         VelocityCommand { heading_mrad: if self.target_mrad < 0 { -1571 } else { 1571 }, speed_permille: 0 }
     }
 
-    /// Records that the robot is lost, and turns to the longest range.
+    /// Records that the robot is lost, and turns to the direction with the most room.
     fn give_up<const SONARS: usize>(&mut self, scan: &RingScan<'_, SONARS>) -> VelocityCommand {
         self.faults.record(FaultKind::DriveLost);
         self.departure = Departure::UNKNOWN;
-        let longest = scan.echoes().max_by_key(|(echo, _)| match echo {
-            Echo::Dead => 0,
-            Echo::Range { range_mm } => *range_mm,
-            Echo::Silence => u16::MAX,
-        });
-        self.target_mrad = longest.map_or(0, |(_, bearing_mrad)| bearing_mrad);
+        self.is_returning = false;
+        let room_mm = self.config.clearance_mm.saturating_mul(2);
+        self.target_mrad = widest_room_mrad(scan, room_mm).unwrap_or(HALF_TURN_MRAD);
+        self.enter(DriveState::Recover);
+        VelocityCommand { heading_mrad: self.target_mrad, speed_permille: 0 }
+    }
+
+    /// Turns round, because the way ahead is no way for the body. The robot returns to the place before.
+    fn turn_back<const SONARS: usize>(&mut self, scan: &RingScan<'_, SONARS>) -> VelocityCommand {
+        if !self.departure.is_known || self.is_returning {
+            return self.give_up(scan);
+        }
+        self.is_returning = true;
+        self.target_mrad = HALF_TURN_MRAD;
         self.enter(DriveState::Recover);
         VelocityCommand { heading_mrad: self.target_mrad, speed_permille: 0 }
     }
@@ -386,7 +439,7 @@ impl LocalPlanner {
         exit_mrad: Option<i16>,
     ) -> VelocityCommand {
         if nearest_ahead(scan).is_some_and(|ahead| ahead.range_mm < self.config.clearance_mm) {
-            return self.give_up(scan);
+            return self.turn_back(scan);
         }
         let mut heading_mrad = edge_heading_mrad(scan, sector, self.config.look_ahead_mm).unwrap_or(0);
         if let Some(exit_mrad) = exit_mrad {
@@ -394,7 +447,19 @@ impl LocalPlanner {
             heading_mrad = heading_mrad.max(least_mrad).min(most_mrad);
         }
         let heading_mrad = heading_mrad.clamp(-MAX_HEADING_MRAD, MAX_HEADING_MRAD).saturating_add(self.sway_mrad(scan));
-        VelocityCommand { heading_mrad, speed_permille: self.speed_permille_at(spread_mm.unwrap_or(u16::MAX)) }
+        let speed_permille = self.speed_permille_at(spread_mm.unwrap_or(u16::MAX));
+        VelocityCommand { heading_mrad, speed_permille: speed_permille.min(self.speed_beside_permille(scan)) }
+    }
+
+    /// The speed that the room on both sides allows: it falls as a wall comes nearer than twice the body.
+    fn speed_beside_permille<const SONARS: usize>(&self, scan: &RingScan<'_, SONARS>) -> u16 {
+        let body_mm = self.config.body_radius_mm;
+        let within = |bearing_mrad: i16| i32::from(bearing_mrad).abs() <= 1745;
+        let nearest_mm = scan.nearest(within).map_or(u16::MAX, |nearest| nearest.range_mm);
+        let room_mm = nearest_mm.saturating_sub(body_mm).min(body_mm);
+        let share = u32::from(self.config.speed_permille) * u32::from(room_mm);
+        let share = share.checked_div(body_mm.into()).map_or(u16::MAX, |share| share as u16);
+        share.max(APPROACH_PERMILLE.min(self.config.speed_permille))
     }
 
     /// With the sensors ahead dead, a swaying robot measures the range ahead with those beside them.

@@ -9,6 +9,7 @@
 //! | Step | File |
 //! |---|---|
 //! | Heading along an edge, position of a meet point | `voronoi.rs` |
+//! | Gaps that the body does not fit through, walls that hold it | `body.rs` |
 //! | State machine from place to place ([`DriveState`]) | `local_planner.rs` |
 //! | Choice of an exit: explore, or drive to a vertex ([`Goal`]) | `route_planner.rs` |
 //! | Travel times over the ways of the map | `routes.rs` |
@@ -20,6 +21,7 @@
 //! planner matches the exits to the ways of the filter's best map by these bearings, and stores nothing of them: every revision
 //! of the map applies at once.
 
+mod body;
 mod config;
 mod local_planner;
 mod route_planner;
@@ -99,6 +101,9 @@ impl<const V: usize> Drive<V> {
         if let Some(place) = place {
             self.route_planner.arrive(filter);
             self.local_planner.arrive(place.degree);
+        } else if self.local_planner.has_returned(detector.is_at_place()) {
+            self.route_planner.refuse(filter);
+            self.local_planner.arrive_again();
         }
         if detector.is_blind() {
             return VelocityCommand::STOP;
@@ -164,6 +169,12 @@ impl<const V: usize> Drive<V> {
     /// Whether the robot has not left the place that was reported last. If so, call [`PlaceDetector::hold_place`].
     pub const fn holds_place(&self) -> bool {
         self.local_planner.holds_place()
+    }
+
+    /// Whether the robot turns away from a wall, or stands in a gap that is too narrow for it. What it measures there is no place:
+    /// call [`PlaceDetector::forget_sightings`].
+    pub const fn is_stuck(&self) -> bool {
+        self.local_planner.is_stuck()
     }
 
     /// Announces that the robot may have been moved to another place. What it knows of its way is void.

@@ -20,6 +20,11 @@ const CONFIRMED_PASSAGES: u8 = 2;
 /// An exit is matched to the way of the map whose bearing differs by at most this, in units of 2⁻¹⁶ of a turn: 0.55 rad.
 const SAME_WAY: u16 = 5736;
 
+/// The number of remembered ways on which the robot turned back.
+const REFUSED: usize = 8;
+/// After turning back this often on a way, the robot does not explore it.
+const REFUSED_TIMES: u8 = 2;
+
 /// What the drive is to do.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
@@ -61,6 +66,29 @@ pub(super) struct RoutePlanner<const V: usize> {
     is_complete: bool,
     /// Successive places that contradict `is_complete`.
     contrary_places: u8,
+    /// The way that was chosen last, if the map has it.
+    chosen: RefusedWay,
+    /// The ways on which the robot turned back, the newest first.
+    refused: [RefusedWay; REFUSED],
+}
+
+/// A way on which the robot turned back. With 0 times it is none; so a `static` robot lies in `.bss`.
+#[derive(Clone, Copy, Debug)]
+struct RefusedWay {
+    vertex: VertexId,
+    /// Its bearing on the map, in units of 2⁻¹⁶ of a turn.
+    bearing: u16,
+    times: u8,
+}
+
+impl RefusedWay {
+    const NONE: Self = Self { vertex: VertexId::FIRST, bearing: 0, times: 0 };
+
+    /// Whether this is a way of the map with at least so many refusals.
+    fn is(&self, darts: Darts<'_>, way: DartId, times: u8) -> bool {
+        let off = darts.bearing(way).unwrap_or(0).wrapping_sub(self.bearing) as i16;
+        self.times >= times && darts.vertex(way) == Some(self.vertex) && off.unsigned_abs() <= SAME_WAY
+    }
 }
 
 /// The ways of the map behind the exits of the present place.
@@ -117,6 +145,8 @@ impl<const V: usize> RoutePlanner<V> {
             decisions: 0,
             is_complete: false,
             contrary_places: 0,
+            chosen: RefusedWay::NONE,
+            refused: [RefusedWay::NONE; REFUSED],
         }
     }
 
@@ -151,12 +181,42 @@ impl<const V: usize> RoutePlanner<V> {
                 None => self.goal_status = GoalStatus::VertexRemoved,
             }
         }
+        for refused in &mut self.refused {
+            match filter.remapped(refused.vertex) {
+                Some(vertex) => refused.vertex = vertex,
+                None => *refused = RefusedWay::NONE,
+            }
+        }
         self.update_completeness(filter);
+    }
+
+    /// The robot turned back on the way that was chosen last.
+    pub(super) fn refuse(&mut self, filter: &impl Filter<V>) {
+        let Some(darts) = filter.darts() else { return };
+        let chosen = core::mem::replace(&mut self.chosen, RefusedWay::NONE);
+        if chosen.times == 0 {
+            return;
+        }
+        let way = darts.ways(chosen.vertex).find(|&way| chosen.is(darts, way, 1));
+        let known = way.and_then(|way| self.refused.iter_mut().find(|refused| refused.is(darts, way, 1)));
+        if let Some(known) = known {
+            known.times = known.times.saturating_add(1);
+        } else {
+            self.refused.rotate_right(1);
+            if let Some(first) = self.refused.first_mut() {
+                *first = chosen;
+            }
+        }
+    }
+
+    /// Whether a way is to be explored: it is new, and the robot has not turned back on it.
+    fn is_open(&self, filter: &impl Filter<V>, darts: Darts<'_>, way: DartId) -> bool {
+        is_frontier(filter, darts, way) && !self.refused.iter().any(|refused| refused.is(darts, way, REFUSED_TIMES))
     }
 
     fn update_completeness(&mut self, filter: &impl Filter<V>) {
         let (Some(darts), Some(here)) = (filter.darts(), filter.recent(0)) else { return };
-        let is_due = frames_to_way::<V>(darts, |way| is_frontier(filter, darts, way) || is_unconfirmed(darts, way));
+        let is_due = frames_to_way::<V>(darts, |way| self.is_open(filter, darts, way) || is_unconfirmed(darts, way));
         let is_due = is_due[here].is_some();
         let seems_complete = !is_due && filter.map_probability_q16() >= COMPLETE_Q16;
         if seems_complete == self.is_complete || self.is_complete && !is_due {
@@ -176,6 +236,7 @@ impl<const V: usize> RoutePlanner<V> {
     pub(super) fn choose(&mut self, filter: &impl Filter<V>, exits: &Exits) -> Option<u16> {
         self.decisions = self.decisions.wrapping_add(1);
         let here = filter.darts().map(|darts| Here::new(darts, filter.arrival(), exits));
+        self.chosen = RefusedWay::NONE;
         let exit = match self.goal {
             Goal::Stop => None,
             Goal::Explore => here.and_then(|here| self.explore(filter, &here)).or_else(|| self.any(exits)),
@@ -187,6 +248,11 @@ impl<const V: usize> RoutePlanner<V> {
                 here.and_then(|here| self.towards(target, &here)).or_else(|| self.any(exits))
             }
         }?;
+        if let Some((way, here)) = here.and_then(|here| Some((here.way(exit)?, here)))
+            && let (Some(vertex), Some(bearing)) = (here.darts.vertex(way), here.darts.bearing(way))
+        {
+            self.chosen = RefusedWay { vertex, bearing, times: 1 };
+        }
         exits.as_slice().get(exit).copied()
     }
 
@@ -208,7 +274,7 @@ impl<const V: usize> RoutePlanner<V> {
     /// The exit with the shortest travel time to a way that is new, or to one with the fewest passages.
     fn explore(&self, filter: &impl Filter<V>, here: &Here<'_>) -> Option<usize> {
         let darts = here.darts;
-        self.towards_way(here, |way| is_frontier(filter, darts, way)).or_else(|| {
+        self.towards_way(here, |way| self.is_open(filter, darts, way)).or_else(|| {
             let least = darts.edges().map(|(way, _)| darts.passages(way)).min()?;
             self.towards_way(here, |way| darts.partner(way).is_some() && darts.passages(way) == least)
         })

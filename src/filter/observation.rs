@@ -18,11 +18,13 @@ pub struct Passage {
     /// The bearing in the ring's geometry of the way by which it came to this place, in milliradians. `None` without a drive; the
     /// way is then searched at [`Place::behind_mrad`].
     pub entry_mrad: Option<i16>,
+    /// Whether the robot turned back on its way, so that the next place is the last one again: it is not reported.
+    pub returns: bool,
 }
 
 impl Passage {
     /// Nothing is known.
-    pub const UNKNOWN: Self = Self { exit: None, travel_frames: None, entry_mrad: None };
+    pub const UNKNOWN: Self = Self { exit: None, travel_frames: None, entry_mrad: None, returns: false };
 
     /// The ways of a place; `None` if no opening was seen. `rotation_mrad` is the change of all bearings since the frame that the
     /// passage was taken from.

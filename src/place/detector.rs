@@ -300,7 +300,8 @@ impl<const SONARS: usize> PlaceDetector<SONARS> {
         }
     }
 
-    fn forget_sightings(&mut self) {
+    /// Announces that the robot is not on the Voronoi graph: what it has seen of a meet point is void.
+    pub fn forget_sightings(&mut self) {
         self.best = [Sighting::NONE; AVERAGED_FRAMES];
         self.sightings = 0;
         self.contrary_frames = 0;

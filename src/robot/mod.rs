@@ -216,6 +216,9 @@ where
         if self.drive.holds_place() {
             self.mapper.hold_place();
         }
+        if self.drive.is_stuck() {
+            self.mapper.forget_sightings();
+        }
         let times_lost = self.drive.faults().count(FaultKind::DriveLost);
         if times_lost != self.times_lost {
             self.times_lost = times_lost;

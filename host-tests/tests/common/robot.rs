@@ -74,12 +74,12 @@ impl<'a> Robot<'a> {
         let turn = turned_back.filter(|_| self.hints.turn && missing_turn >= self.hints.missing_percent);
         let turn = turn.map(|back| if back != (wrong_turn < self.hints.wrong_percent) { Exit::Back } else { Exit::On });
         let ways = self.environment.neighbours()[place].len() as u8;
-        let told = match self.random.below(20) {
+        let reported = match self.random.below(20) {
             0 => ways.saturating_sub(1).max(1),
             1 => ways + 1,
             _ => ways,
         };
-        let degree = (self.hints.degree && missing_degree >= self.hints.missing_percent).then_some(told);
+        let degree = (self.hints.degree && missing_degree >= self.hints.missing_percent).then_some(reported);
         let begins = carried.is_some_and(|(_, is_told)| is_told);
         let ways = degree.and_then(|degree| Ways::from_count(degree).ok());
         Observation { ways, exit: turn, starts_sequence: begins, ..Observation::new(self.look(place)) }

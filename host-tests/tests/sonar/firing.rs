@@ -22,9 +22,9 @@ fn rough() -> RingFrame<16> {
 
 /// With crosstalk an odd sensor measures the range of its nearer neighbour; an even one receives its own echo first.
 fn disturbed() -> RingFrame<16> {
-    let (heard, mut frame) = (rough().echoes, rough());
+    let (echoes, mut frame) = (rough().echoes, rough());
     for sensor in (1..16).step_by(2) {
-        let neighbours = [heard[sensor - 1], heard[(sensor + 1) % 16]];
+        let neighbours = [echoes[sensor - 1], echoes[(sensor + 1) % 16]];
         frame.echoes[sensor] = neighbours.into_iter().min_by_key(|echo| echo.range_mm()).unwrap();
     }
     frame

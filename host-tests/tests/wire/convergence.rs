@@ -52,9 +52,9 @@ fn a_new_vertex_and_its_edge_are_sent_as_events() {
     robot.filter.map.add_vertex(Fingerprint::MAX).expect("there is room");
     robot.filter.map.add_edge(vertex(0), vertex(1));
     robot.filter.location = vertex(1);
-    let mut told = Vec::new();
+    let mut sent = Vec::new();
     robot.reporter.update(&robot.filter, &robot.update(), |message| {
-        told.push(*message);
+        sent.push(*message);
         Ok(())
     });
     let update = robot.update();
@@ -67,7 +67,7 @@ fn a_new_vertex_and_its_edge_are_sent_as_events() {
         Message::Evidence(Evidence::from(&update)),
         Message::Worst(Worst::of(&robot.filter, update.place_index)),
     ];
-    assert_eq!(told, expected);
+    assert_eq!(sent, expected);
 }
 
 #[test]

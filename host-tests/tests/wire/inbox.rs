@@ -55,9 +55,9 @@ fn a_corrupt_request_is_not_executed_and_the_next_one_is() {
             for flip in 1..=255 {
                 let mut damaged = whole.clone();
                 damaged[place] ^= flip;
-                let heard = executed(&mut Inbox::new(), &[&damaged[..], &[0], &after].concat());
+                let commands = executed(&mut Inbox::new(), &[&damaged[..], &[0], &after].concat());
                 // Without its closing zero, the frame ends at the zero of the next one, with one byte too many.
-                assert_eq!(heard, [AFTER.command], "{request:?}, byte {place} ^ {flip}");
+                assert_eq!(commands, [AFTER.command], "{request:?}, byte {place} ^ {flip}");
             }
         }
     }
@@ -190,8 +190,8 @@ fn a_flood_at_the_full_line_rate_does_not_change_the_mapping() {
         );
         assert!(map_messages(&robot.said) == said, "{what}");
         // The counts are sent, and the next request is answered.
-        let told = Message::Fault { kind: kind as u8, count: robot.inbox.faults().count(kind) };
-        assert!(robot.said.iter().rev().take(40).any(|message| *message == told), "{what}: the last count is sent");
+        let expected = Message::Fault { kind: kind as u8, count: robot.inbox.faults().count(kind) };
+        assert!(robot.said.iter().rev().take(40).any(|message| *message == expected), "{what}: the last count is sent");
         robot.turn(&[]);
         robot.turn(&[&[0][..], &frame(&mut Encoder::new(0), &AFTER)].concat());
         let answered = Message::Reply(Reply { request: AFTER.id, outcome: Outcome::Done });

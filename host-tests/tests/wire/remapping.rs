@@ -36,17 +36,17 @@ fn a_merge_sends_one_remapping_and_the_changed_vertices() {
     robot.filter.map.observe(vertex(1), Fingerprint::from_steps(400).expect("in range"));
     robot.filter.map.add_edge(vertex(0), vertex(1));
     robot.filter.map.add_edge(vertex(1), vertex(2));
-    let mut told = Vec::new();
+    let mut sent = Vec::new();
     let update = robot.update();
     robot.reporter.update(&robot.filter, &update, |message| {
-        told.push(*message);
+        sent.push(*message);
         listener.decode(&frame(&mut robot.encoder, message));
         Ok(())
     });
-    let Message::Remapped(renamed) = told[0] else { panic!("{told:?}") };
+    let Message::Remapped(renamed) = sent[0] else { panic!("{sent:?}") };
     assert_eq!(renamed.vertices.as_slice(), [2, 1, 0, 1]);
-    assert_eq!(told[1], Message::Vertex { vertex: 1, radius_mm: 600, visits: 2 });
-    assert!(matches!(told[2], Message::Map { vertices: 3, edges: 2, .. }), "{told:?}");
+    assert_eq!(sent[1], Message::Vertex { vertex: 1, radius_mm: 600, visits: 2 });
+    assert!(matches!(sent[2], Message::Map { vertices: 3, edges: 2, .. }), "{sent:?}");
     assert!(listener.replica.is_converged() && same(&listener.replica, &robot.filter));
 }
 

@@ -20,7 +20,7 @@ use ratatui::{Terminal, backend::TestBackend};
 use toposlam::reference::SNAPSHOT_BYTES;
 use toposlam_cli::monitor::{model::Model, screen, view};
 use toposlam_link::broadcast::Broadcast;
-use toposlam_link::link::{News, Options};
+use toposlam_link::link::{LinkEvent, Options};
 use toposlam_link::listener::Listener;
 use toposlam_sim::exploration::Exploration;
 use toposlam_sim::world::{Plan, RobotModel};
@@ -93,10 +93,11 @@ fn screenshot(columns: u16, rows: u16, places: usize) -> anyhow::Result<()> {
     let mut buffer = [0; SNAPSHOT_BYTES];
     let mut exploration = Exploration::start(&plan, RobotModel::default(), 1, &mut buffer)?;
     let (mut model, mut listener, now) = (Model::new("tcp:127.0.0.1:7070"), Listener::new(), Instant::now());
-    model.hear(News::Connected, now);
+    model.apply(LinkEvent::Connected, now);
     while exploration.places() < places {
         exploration.advance();
-        listener.feed(&exploration.board().sent, |listener, event| model.hear(News::heard(listener, event), now));
+        listener
+            .feed(&exploration.board().sent, |listener, event| model.apply(LinkEvent::received(listener, event), now));
         model.settle(now);
     }
     let mut terminal = Terminal::new(TestBackend::new(columns, rows))?;

@@ -20,6 +20,8 @@ enum Task {
     Explore(command::explore::Arguments),
     /// Run the firmware in an emulated STM32F405, and compare its map with that of `simulate` bit for bit.
     Emulate(command::emulate::Arguments),
+    /// List and draw the places of a floor plan that a robot can tell apart.
+    Plan(command::plan::Arguments),
     /// Simulate a robot for hours with injected faults and an operator, and check its fault counters.
     Soak(command::soak::Arguments),
     /// Map a CSV file of recorded ring ranges.
@@ -54,6 +56,7 @@ fn main() -> anyhow::Result<()> {
         Task::Simulate(arguments) => command::simulate::run(&arguments),
         Task::Explore(arguments) => command::explore::run(&arguments),
         Task::Emulate(arguments) => command::emulate::run(&arguments),
+        Task::Plan(arguments) => command::plan::run(&arguments),
         Task::Soak(arguments) => command::soak::run(&arguments),
         Task::Replay(arguments) => command::replay::run(&arguments),
         Task::Evaluate(arguments) => command::evaluate::run(&arguments),

@@ -36,6 +36,35 @@ fn simulate_prints_a_line_for_each_place_and_draws_the_map() {
 }
 
 #[test]
+fn plan_lists_the_places_of_a_map_draws_them_and_warns() {
+    let directory = tempfile::tempdir().unwrap();
+    let file = |name: &str| directory.path().join(name).to_str().unwrap().to_owned();
+    // Two rooms of 3 m by 2 m, apart by a wall of 0.2 m.
+    let pixel = |x: u32, y: u32| if (2..42).contains(&y) && (2..62).contains(&(x % 64)) { 255 } else { 0 };
+    let pixels = (0..44).flat_map(|y| (0..128).map(move |x| pixel(x, y)));
+    std::fs::write(file("map.pgm"), b"P5 128 44 255\n".iter().copied().chain(pixels).collect::<Vec<u8>>()).unwrap();
+    std::fs::write(file("map.yaml"), "image: map.pgm\nresolution: 0.05\norigin: [-1, 2, 0]\n").unwrap();
+    let (map, svg) = (file("map.yaml"), file("plan.svg"));
+    let text = printed(&toposlam(&["plan", &map, "--svg", &svg, "--start", "4.5,3"]));
+    assert!(text.contains("6.40 m by 2.20 m, 8 wall surfaces, start 4.50,3.00"), "{text}");
+    assert!(text.contains("place   0 at     3.30,3.10    radius  1000 mm, degree 1"), "{text}");
+    assert!(text.contains("edge   0 -   1, 1.00 m") && text.contains("unreachable: 2 meet points"), "{text}");
+    assert!(!text.contains("warning"), "{text}");
+    assert!(std::fs::read_to_string(&svg).unwrap().contains("2 places, 1 edges"));
+    let text = printed(&toposlam(&["plan", &map, "--start", "-0.85,3"]));
+    assert!(text.contains("warning: the body does not fit at the start"), "{text}");
+    // Nine by nine corridors 2 m wide.
+    let cell = |x: u32, y: u32| if x % 12 < 4 || y % 12 < 4 { '.' } else { '#' };
+    let rows: Vec<String> = (0..100).map(|y| (0..100).map(|x| cell(x, y)).collect()).collect();
+    std::fs::write(file("grid.txt"), format!("cell_mm 500\n{}\n", rows.join("\n"))).unwrap();
+    assert!(printed(&toposlam(&["plan", &file("grid.txt")])).contains("warning: 81 places"));
+    assert!(complaint(&toposlam(&["plan", &map, "--start", "-2,3"])).contains("in a wall"));
+    std::fs::write(file("map.yaml"), "image: map.pgm\nresolution: -0.05\n").unwrap();
+    let error = complaint(&toposlam(&["plan", &map]));
+    assert!(error.contains("map.yaml: line 2: resolution must be a number of metres from 0.01 to 1"), "{error}");
+}
+
+#[test]
 fn a_fleet_of_another_process_is_monitored_without_loss() {
     let text = printed(&toposlam(&["fleet", "--simulate", "3", "--seconds", "1", "--speed", "0"]));
     assert!(text.contains("3 connected, 0 closed, 0 failed"), "{text}");

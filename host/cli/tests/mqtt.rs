@@ -12,9 +12,9 @@ use std::time::{Duration, Instant};
 use rumqttc::{Client, Connection, Event, MqttOptions, Packet, Publish, QoS};
 use serde_json::Value;
 use toposlam::reference::SNAPSHOT_BYTES;
-use toposlam_cli::publish::{BrokerNews, Options, Publisher};
+use toposlam_cli::publish::{BrokerEvent, Options, Publisher};
 use toposlam_link::broadcast::Broadcast;
-use toposlam_link::link::News;
+use toposlam_link::link::LinkEvent;
 use toposlam_link::listener::Listener;
 use toposlam_link::topology::TopologicalMap;
 use toposlam_sim::exploration::Exploration;
@@ -207,25 +207,25 @@ fn a_reconnected_broker_gets_the_newest_map_and_drops_are_counted() {
     let options = Options::new(format!("mqtt://127.0.0.1:{port}").parse().unwrap(), "kitchen").unwrap();
     let (sender, news) = channel();
     let mut publisher = Publisher::start(options, move |news| sender.send(news).unwrap_or_default());
-    publisher.hear(&News::Connected);
+    publisher.apply(&LinkEvent::Connected);
     let (mut listener, mut events) = (Listener::new(), 0);
     let mut buffer = [0; SNAPSHOT_BYTES];
     let exploration = explored(&mut buffer, |said| {
         listener.feed(said, |listener, event| {
-            publisher.hear(&News::heard(listener, event));
+            publisher.apply(&LinkEvent::received(listener, event));
             events += 1;
         });
     });
     assert_eq!(publisher.counters().dropped, events);
-    assert!(matches!(news.recv_timeout(DEADLINE).unwrap(), BrokerNews::Disconnected(_)));
+    assert!(matches!(news.recv_timeout(DEADLINE).unwrap(), BrokerEvent::Disconnected(_)));
 
     for _ in 0..2 {
         let broker = start_broker(program, directory.path(), port);
-        assert_eq!(news.recv_timeout(DEADLINE).unwrap(), BrokerNews::Connected);
+        assert_eq!(news.recv_timeout(DEADLINE).unwrap(), BrokerEvent::Connected);
         let mut subscriber = Subscriber::connect(port, "subscriber");
         subscriber.wait_for_map(&map(&exploration));
         drop(broker);
-        assert!(matches!(news.recv_timeout(DEADLINE).unwrap(), BrokerNews::Disconnected(_)));
+        assert!(matches!(news.recv_timeout(DEADLINE).unwrap(), BrokerEvent::Disconnected(_)));
     }
     let _broker = start_broker(program, directory.path(), port);
     let mut subscriber = Subscriber::connect(port, "subscriber");
@@ -246,10 +246,10 @@ fn a_broker_that_does_not_read_blocks_nobody() {
     let (mut connection, _) = broker.accept().unwrap();
     // The connection is accepted, but never read.
     connection.write_all(&[0x20, 2, 0, 0]).unwrap();
-    assert_eq!(news.recv_timeout(DEADLINE).unwrap(), BrokerNews::Connected);
+    assert_eq!(news.recv_timeout(DEADLINE).unwrap(), BrokerEvent::Connected);
     let (mut listener, mut events) = (Listener::new(), 0);
     while publisher.counters().dropped < SOME {
-        listener.feed(&[7, 0], |listener, event| publisher.hear(&News::heard(listener, event)));
+        listener.feed(&[7, 0], |listener, event| publisher.apply(&LinkEvent::received(listener, event)));
         events += 1;
     }
     // The status is published as well.

@@ -90,6 +90,21 @@ fn a_played_recording_sends_the_bytes_of_the_robot() {
     assert_eq!(frames(&first).0, frames_of_first);
 }
 
+#[test]
+fn a_recording_of_a_robot_is_mapped_again_from_its_ring_frames() {
+    let directory = tempfile::tempdir().unwrap();
+    let file = directory.path().join("robot.mcap");
+    let (_robot, line) = robot();
+    printed(&["record", &line, file.to_str().unwrap(), "--places", "6"]);
+    let text = printed(&["replay", file.to_str().unwrap()]);
+    // The recording may begin after the first place and end during the last.
+    let places: usize =
+        text.lines().find_map(|line| line.split_once(" frames, ")?.1.strip_suffix(" places")?.parse().ok()).unwrap();
+    assert!((5..=8).contains(&places), "{text}");
+    let refused = toposlam(&["replay", file.to_str().unwrap(), "--ring", "scitos-g5"]).output().unwrap();
+    assert!(String::from_utf8_lossy(&refused.stderr).contains("the ring has 24 sonars, the recording 16"));
+}
+
 #[cfg(unix)]
 #[test]
 fn ctrl_c_finishes_a_recording_and_a_kill_leaves_it_readable() {

@@ -35,12 +35,13 @@ fn round_plan() -> Plan {
     Plan::parse(&text).unwrap()
 }
 
-/// Laps of the round in centimetres, with a column for each sonar, and the number of frames per lap.
+/// Laps of the round in centimetres, with a column for each sonar and the pose, and the number of frames per lap. The first sonar
+/// has no range in the first three frames.
 fn laps_of_the_round(columns: &[String], laps: usize) -> (String, usize) {
     let model = RobotModel { u_turn_share: 0.0, ..RobotModel::default() };
     let simulation = Simulation::new(&round_plan(), model, 1).unwrap();
     assert_eq!(simulation.true_map().nodes.len(), 4);
-    let mut rows = vec![columns.join(",")];
+    let mut rows = vec![format!("{},x,y,theta", columns.join(","))];
     // The first node that the robot passed, and when.
     let mut first = None;
     let mut lap_frames = usize::MAX;
@@ -60,7 +61,13 @@ fn laps_of_the_round(columns: &[String], laps: usize) -> (String, usize) {
             Echo::Silence => "600".to_owned(),
             Echo::Dead => String::new(),
         });
-        rows.push(ranges_cm.join(","));
+        let (x_cm, y_cm) = (truth.pose.position.x_mm / 10.0, truth.pose.position.y_mm / 10.0);
+        let mut row = format!("{},{x_cm:.1},{y_cm:.1},{:.4}", ranges_cm.join(","), truth.pose.heading_rad);
+        if frame_index < 3 {
+            row = row.split_once(',').unwrap().1.to_owned();
+            row.insert(0, ',');
+        }
+        rows.push(row);
     }
     (rows.join("\n"), lap_frames)
 }
@@ -87,6 +94,13 @@ fn laps_of_a_round_on_the_voronoi_graph_repeat_and_their_map_is_a_cycle() {
     assert!(text.contains("map: 4 vertices, 4 edges") && text.ends_with("the map is a cycle\n"), "{text}");
     let [_, on_graph, _] = numbers(&text, "the two nearest obstacles", "%")[..] else { panic!("{text}") };
     assert!(on_graph >= 95, "{text}");
+
+    // The poses show the same: four spots, each passed four more times.
+    let text = replayed(&[file, "--ring", ring, "--poses", "x,y,theta"]);
+    assert!(text.contains("sonar s0: no range in 3 of"), "{text}");
+    assert!(text.contains("20 places at 4 spots"), "{text}");
+    assert!(text.contains("with the same heading: 16; detected again: 16; as the same vertex: 16"), "{text}");
+    assert!(text.contains("more than 3 m apart in one vertex: 0 of"), "{text}");
 
     // If a lap is a fifth too long, most places are outside the tolerance.
     let text = replayed(&[file, "--ring", ring, "--lap-frames", &(lap_frames * 6 / 5).to_string()]);

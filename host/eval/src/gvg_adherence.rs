@@ -49,16 +49,16 @@ fn nearest_mm<const SONARS: usize>(
     geometry: &RingGeometry<SONARS>,
     config: &PlaceConfig,
 ) -> Vec<u16> {
-    let heard = frame.echoes.iter().zip(&geometry.bearings_mrad).filter_map(|(echo, bearing_mrad)| match echo {
+    let obstacles = frame.echoes.iter().zip(&geometry.bearings_mrad).filter_map(|(echo, bearing_mrad)| match echo {
         Echo::Range { range_mm } if (config.range_min_mm..=config.range_max_mm).contains(range_mm) => {
             Some((*range_mm, *bearing_mrad))
         }
         _ => None,
     });
-    let mut heard: Vec<(u16, i16)> = heard.collect();
-    heard.sort_unstable();
+    let mut obstacles: Vec<(u16, i16)> = obstacles.collect();
+    obstacles.sort_unstable();
     let mut nearest: Vec<(u16, i16)> = Vec::new();
-    for (range_mm, bearing_mrad) in heard {
+    for (range_mm, bearing_mrad) in obstacles {
         let is_apart = |&(_, other_mrad): &(u16, i16)| {
             let turn_mrad = i32::from(bearing_mrad).abs_diff(other_mrad.into());
             turn_mrad.min(6283_u32.saturating_sub(turn_mrad)) >= config.separation_mrad.into()

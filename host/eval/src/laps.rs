@@ -166,7 +166,7 @@ impl fmt::Display for Laps {
                 continue;
             }
             let (again, expected) = (lap.again.len(), lap.again.len() + lap.missing.len());
-            let told = lap.again.iter().map(|(first, visit)| {
+            let visits = lap.again.iter().map(|(first, visit)| {
                 let vertex = if is_same(first, visit) {
                     format!("vertex {} again", Named(visit.vertex))
                 } else {
@@ -175,7 +175,7 @@ impl fmt::Display for Laps {
                 format!("{} at {} ({vertex})", first.frame, position(visit))
             });
             let number = number + 1;
-            writeln!(f, "  {again} of {expected} places of lap 1 come again in lap {number}: {}", listed(told))?;
+            writeln!(f, "  {again} of {expected} places of lap 1 come again in lap {number}: {}", listed(visits))?;
             let missing = lap.missing.iter().map(|visit| visit.frame.to_string());
             let extra = lap.extra.iter().map(|visit| position(visit).to_string());
             writeln!(f, "  missing: {}; extra: {}", listed(missing), listed(extra))?;

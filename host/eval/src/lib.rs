@@ -6,7 +6,7 @@
 //!
 //! [`mapping`] maps ring frames on the host, from a simulation or from a [`range_csv`] recording of a real ring.
 //! [`gvg_adherence`] measures how closely a recorded robot followed the Voronoi graph, and [`laps`] compares the laps
-//! of a recording. [`soak`] runs a simulated robot with faults for hours.
+//! of a recording, and [`revisits`] judges it by recorded poses. [`soak`] runs a simulated robot with faults for hours.
 
 pub mod ancestry;
 pub mod candidate;
@@ -30,6 +30,7 @@ mod planar;
 pub mod prior;
 pub mod range_csv;
 pub mod report;
+pub mod revisits;
 pub mod rotation;
 pub mod run;
 pub mod score;

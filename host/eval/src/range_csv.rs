@@ -1,10 +1,15 @@
-//! Recorded ring ranges: a CSV file with a column for each sonar, and a TOML file with the geometry of the ring.
+//! Recorded ring ranges: a CSV file with a column for each sonar and optionally the robot's pose, and a TOML file with the geometry
+//! of the ring.
 
 use std::io::Read;
+use std::str::FromStr;
 
 use anyhow::{Context, bail, ensure};
+use csv::StringRecord;
 use serde::Deserialize;
 use toposlam::ring::{Echo, RingFrame, RingGeometry};
+
+use crate::revisits::Pose;
 
 /// The largest ring that can be replayed. A smaller ring fills the first positions, and the others are dead.
 pub const SONARS_MAX: usize = 32;
@@ -50,6 +55,36 @@ pub struct Ring {
     pub ring_radius: f64,
 }
 
+/// The names of the columns of a pose: x, y and heading.
+///
+/// ```
+/// let columns: toposlam_eval::range_csv::PoseColumns = "x,y,theta".parse()?;
+/// # Ok::<(), anyhow::Error>(())
+/// ```
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct PoseColumns([String; 3]);
+
+impl FromStr for PoseColumns {
+    type Err = anyhow::Error;
+
+    fn from_str(text: &str) -> Result<Self, Self::Err> {
+        let names: Vec<String> = text.split(',').map(|name| name.trim().to_owned()).collect();
+        let Ok(names) = <[String; 3]>::try_from(names) else { bail!("three columns, X,Y,THETA") };
+        Ok(Self(names))
+    }
+}
+
+/// The frames of a recording.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Recorded {
+    /// The frames in order.
+    pub frames: Vec<RingFrame<SONARS_MAX>>,
+    /// The pose of each frame, `None` where the recording has none; empty if no columns of poses were requested.
+    pub poses: Vec<Option<Pose>>,
+    /// For each sonar the number of frames without a range, in which it is a dead sensor.
+    pub blanks: Vec<usize>,
+}
+
 /// The unit of a recording's ranges.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "lowercase")]
@@ -93,6 +128,24 @@ impl Ring {
         Ok(ring)
     }
 
+    /// A ring of sonars at equal distances, counter-clockwise from straight ahead, with ranges in millimetres.
+    ///
+    /// # Errors
+    /// When the number of sonars is not 3 to [`SONARS_MAX`].
+    pub fn even(sonars: usize) -> anyhow::Result<Self> {
+        ensure!((3..=SONARS_MAX).contains(&sonars), "sonars must be 3 to {SONARS_MAX}, not {sonars}");
+        Ok(Self {
+            sonars,
+            unit: Unit::Mm,
+            max_range: f64::INFINITY,
+            columns: (0..sonars).map(|sonar| sonar.to_string()).collect(),
+            bearings_deg: (0..sonars).map(|sonar| 360.0 * sonar as f64 / sonars as f64).collect(),
+            first_bearing_deg: 0.0,
+            step_deg: 0.0,
+            ring_radius: 0.0,
+        })
+    }
+
     /// The geometry of the ring.
     pub fn geometry(&self) -> RingGeometry<SONARS_MAX> {
         let mut geometry = RingGeometry { bearings_mrad: [0; SONARS_MAX] };
@@ -103,34 +156,43 @@ impl Ring {
         geometry
     }
 
-    /// Reads the frames of a recording; other columns are ignored.
+    /// Reads a recording; other columns are ignored.
     ///
     /// An empty, negative or unreadable range is a dead sensor. A range of `max_range` or more, or infinite, is
-    /// silence.
+    /// silence. The position of a pose has the unit of the ranges, its heading is in radians.
     ///
     /// # Errors
     /// When a column is missing, or a line is no CSV or has too few fields.
-    pub fn read(&self, csv_text: impl Read) -> anyhow::Result<Vec<RingFrame<SONARS_MAX>>> {
+    pub fn read(&self, csv_text: impl Read, poses: Option<&PoseColumns>) -> anyhow::Result<Recorded> {
         let mut reader = csv::ReaderBuilder::new().trim(csv::Trim::All).from_reader(csv_text);
         let headers = reader.headers().context("the recording's header line")?.clone();
-        let mut places = Vec::new();
-        for column in &self.columns {
-            let Some(place) = headers.iter().position(|header| header == column) else {
-                let first = headers.get(0).unwrap_or("");
-                bail!("no column {column:?}: the first line must name the columns, and begins with {first:?}");
-            };
-            places.push(place);
-        }
-        let mut frames = Vec::new();
+        let positions = |names: &[String]| -> anyhow::Result<Vec<usize>> {
+            names.iter().map(|name| position(&headers, name)).collect()
+        };
+        let of_ranges = positions(&self.columns)?;
+        let of_pose = poses.map(|poses| positions(&poses.0)).transpose()?;
+        let mut recorded = Recorded { blanks: vec![0; self.sonars], ..Recorded::default() };
         for record in reader.records() {
             let record = record?;
             let mut frame = RingFrame { echoes: [Echo::Dead; SONARS_MAX] };
-            for (echo, place) in frame.echoes.iter_mut().zip(&places) {
-                *echo = self.echo(record.get(*place).unwrap_or(""));
+            for ((echo, position), blanks) in frame.echoes.iter_mut().zip(&of_ranges).zip(&mut recorded.blanks) {
+                *echo = self.echo(record.get(*position).unwrap_or(""));
+                *blanks += usize::from(*echo == Echo::Dead);
             }
-            frames.push(frame);
+            recorded.frames.push(frame);
+            if let Some(of_pose) = &of_pose {
+                recorded.poses.push(self.pose(&record, of_pose));
+            }
         }
-        Ok(frames)
+        Ok(recorded)
+    }
+
+    fn pose(&self, record: &StringRecord, positions: &[usize]) -> Option<Pose> {
+        let field = |number: usize| {
+            let value: f64 = record.get(*positions.get(number)?)?.parse().ok()?;
+            value.is_finite().then_some(value)
+        };
+        Some(Pose { x_mm: field(0)? * self.unit.mm(), y_mm: field(1)? * self.unit.mm(), theta_rad: field(2)? })
     }
 
     fn echo(&self, field: &str) -> Echo {
@@ -145,6 +207,15 @@ impl Ring {
     }
 }
 
+/// The position of a column.
+fn position(headers: &StringRecord, name: &str) -> anyhow::Result<usize> {
+    let Some(position) = headers.iter().position(|header| header == name) else {
+        let first = headers.get(0).unwrap_or("");
+        bail!("no column {name:?}: the first line must name the columns, and begins with {first:?}");
+    };
+    Ok(position)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -155,8 +226,10 @@ mod tests {
     #[test]
     fn columns_are_found_by_name_and_ranges_scaled() {
         let ring = Ring::parse(FOUR).unwrap();
-        let frames = ring.read("x,d,c,b,a\nfoo,1,2.5,600,\nbar,inf,-1,abc,9999".as_bytes()).unwrap();
-        assert_eq!(frames.len(), 2);
+        let frames = ring.read("x,d,c,b,a\nfoo,1,2.5,600,\nbar,inf,-1,abc,9999".as_bytes(), None).unwrap();
+        let Recorded { frames, poses, blanks } = frames;
+        assert_eq!((frames.len(), poses.len()), (2, 0));
+        assert_eq!(blanks, [1, 1, 1, 0]);
         let range = |range_mm| Echo::Range { range_mm };
         assert_eq!(frames[0].echoes[..5], [Echo::Dead, Echo::Silence, range(25), range(10), Echo::Dead]);
         assert_eq!(frames[1].echoes[..4], [Echo::Silence, Echo::Dead, Echo::Dead, Echo::Silence]);
@@ -165,10 +238,23 @@ mod tests {
     #[test]
     fn a_recording_with_a_missing_column_or_a_short_line_is_rejected() {
         let ring = Ring::parse(FOUR).unwrap();
-        assert!(ring.read("a,b,c\n1,2,3".as_bytes()).unwrap_err().to_string().contains("\"d\""));
-        assert!(ring.read("a,b,c,d\n1,2,3".as_bytes()).is_err());
-        let no_header = ring.read("0.438,2,3,4".as_bytes()).unwrap_err().to_string();
+        assert!(ring.read("a,b,c\n1,2,3".as_bytes(), None).unwrap_err().to_string().contains("\"d\""));
+        assert!(ring.read("a,b,c,d\n1,2,3".as_bytes(), None).is_err());
+        let no_header = ring.read("0.438,2,3,4".as_bytes(), None).unwrap_err().to_string();
         assert_eq!(no_header, "no column \"a\": the first line must name the columns, and begins with \"0.438\"");
+    }
+
+    #[test]
+    fn poses_are_read_in_the_unit_of_the_ranges() {
+        let ring = Ring::parse(FOUR).unwrap();
+        let columns: PoseColumns = "px,py,phi".parse().unwrap();
+        let text = "a,b,c,d,px,py,phi\n1,1,1,1,100,-50,0.5\n1,1,1,1,,0,0\n1,1,1,1,0,0,nan";
+        let recorded = ring.read(text.as_bytes(), Some(&columns)).unwrap();
+        let first = Pose { x_mm: 1000.0, y_mm: -500.0, theta_rad: 0.5 };
+        assert_eq!(recorded.poses, [Some(first), None, None]);
+        let missing = ring.read("a,b,c,d\n1,2,3,4".as_bytes(), Some(&columns)).unwrap_err().to_string();
+        assert!(missing.contains("\"px\""), "{missing}");
+        assert!("x,y".parse::<PoseColumns>().is_err());
     }
 
     #[test]

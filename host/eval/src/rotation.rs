@@ -167,7 +167,7 @@ impl From<Darts<'_>> for RotationSystem {
 mod tests {
     use super::*;
     use rand::seq::SliceRandom;
-    use toposlam_sim::world::Plan;
+    use toposlam_sim::world::{Limits, Plan};
 
     #[test]
     fn isomorphic_systems_differ_in_their_numbers_only() {
@@ -181,7 +181,7 @@ mod tests {
 
     #[test]
     fn a_building_is_isomorphic_to_itself_only() {
-        let system = |name| RotationSystem::from(&TrueMap::of(&Plan::built_in(name).unwrap()).unwrap());
+        let system = |name| RotationSystem::from(&*Plan::built_in(name).unwrap().true_map(&Limits::default()).unwrap());
         let (office, ring) = (system("office"), system("ring"));
         assert!(office.is_isomorphic_to(&office) && !office.is_isomorphic_to(&ring));
         assert_eq!((office.genus(), ring.genus()), (0, 0));

@@ -22,10 +22,10 @@ const BACKLOG_BYTES: usize = 1 << 16;
 /// while robot.listeners() == 0 {
 ///     robot.exchange(&[]);
 /// }
-/// robot.exchange(b"what the robot says");
-/// let mut heard = [0; 19];
-/// laptop.read_exact(&mut heard)?;
-/// assert_eq!(&heard, b"what the robot says");
+/// robot.exchange(b"what a robot sends");
+/// let mut received = [0; 18];
+/// laptop.read_exact(&mut received)?;
+/// assert_eq!(&received, b"what a robot sends");
 /// # Ok::<(), std::io::Error>(())
 /// ```
 pub struct Broadcast {
@@ -69,22 +69,22 @@ impl Broadcast {
 
     /// Sends bytes to all clients and returns the bytes received from them. Never blocks; removes clients that have
     /// disconnected.
-    pub fn exchange(&mut self, said: &[u8]) -> Vec<u8> {
+    pub fn exchange(&mut self, sent: &[u8]) -> Vec<u8> {
         while let Ok((stream, _)) = self.port.accept() {
             if stream.set_nonblocking(true).is_ok() && stream.set_nodelay(true).is_ok() {
                 self.listeners.push(Connection { stream, unsent: VecDeque::new() });
             }
         }
-        let mut heard = Vec::new();
-        self.listeners.retain_mut(|listener| listener.exchange(said, &mut heard).is_ok());
-        heard
+        let mut received = Vec::new();
+        self.listeners.retain_mut(|listener| listener.exchange(sent, &mut received).is_ok());
+        received
     }
 }
 
 impl Connection {
-    fn exchange(&mut self, said: &[u8], heard: &mut Vec<u8>) -> io::Result<()> {
-        if self.unsent.len() + said.len() <= BACKLOG_BYTES {
-            self.unsent.extend(said);
+    fn exchange(&mut self, sent: &[u8], received: &mut Vec<u8>) -> io::Result<()> {
+        if self.unsent.len() + sent.len() <= BACKLOG_BYTES {
+            self.unsent.extend(sent);
         }
         while !self.unsent.is_empty() {
             match self.stream.write(self.unsent.as_slices().0) {
@@ -98,7 +98,7 @@ impl Connection {
         loop {
             match self.stream.read(&mut buffer) {
                 Ok(0) => return Err(io::ErrorKind::UnexpectedEof.into()),
-                Ok(count) => heard.extend_from_slice(&buffer[..count]),
+                Ok(count) => received.extend_from_slice(&buffer[..count]),
                 Err(error) if error.kind() == io::ErrorKind::WouldBlock => return Ok(()),
                 Err(error) => return Err(error),
             }
@@ -120,14 +120,14 @@ mod tests {
         }
         broadcast.exchange(b"abc");
         for client in &mut clients {
-            let mut heard = [0; 3];
-            client.read_exact(&mut heard).unwrap();
-            assert_eq!(&heard, b"abc");
+            let mut received = [0; 3];
+            client.read_exact(&mut received).unwrap();
+            assert_eq!(&received, b"abc");
             client.write_all(b"x").unwrap();
         }
-        let mut heard = Vec::new();
-        while heard.len() < 2 {
-            heard.extend(broadcast.exchange(&[]));
+        let mut received = Vec::new();
+        while received.len() < 2 {
+            received.extend(broadcast.exchange(&[]));
         }
         clients.clear();
         while broadcast.listeners() > 0 {

@@ -30,9 +30,9 @@ const BUFFER_BYTES: usize = 4096;
 /// std::fs::write("office.map", client.snapshot()?)?;
 /// # Ok::<(), anyhow::Error>(())
 /// ```
-pub struct Client<LINE, HEARD> {
-    line: LINE,
-    heard: HEARD,
+pub struct Client<L, F> {
+    line: L,
+    on_event: F,
     encoder: Encoder,
     listener: Listener,
     next_id: u16,
@@ -42,13 +42,13 @@ pub struct Client<LINE, HEARD> {
     pub attempts: u32,
 }
 
-impl<LINE: Read + Write, HEARD: FnMut(&Listener, Event<'_>)> Client<LINE, HEARD> {
+impl<L: Read + Write, F: FnMut(&Listener, Event<'_>)> Client<L, F> {
     /// A client on a line. `first_id` should differ from the last request id of the previous client; use a random
     /// number.
-    pub fn new(line: LINE, first_id: u16, heard: HEARD) -> Self {
+    pub fn new(line: L, first_id: u16, on_event: F) -> Self {
         Self {
             line,
-            heard,
+            on_event,
             encoder: Encoder::default(),
             listener: Listener::new(),
             next_id: first_id,
@@ -63,9 +63,9 @@ impl<LINE: Read + Write, HEARD: FnMut(&Listener, Event<'_>)> Client<LINE, HEARD>
     }
 
     /// Continues on another line after the previous one failed; keeps the state.
-    pub fn reconnect(&mut self, line: LINE) {
+    pub fn reconnect(&mut self, line: L) {
         self.line = line;
-        self.listener.reconnected(&mut self.heard);
+        self.listener.reconnected(&mut self.on_event);
     }
 
     /// Reads the line once and processes the received bytes, if any.
@@ -189,14 +189,14 @@ impl<LINE: Read + Write, HEARD: FnMut(&Listener, Event<'_>)> Client<LINE, HEARD>
             Err(error) => return Err(error.into()),
         };
         let mut outcome = None;
-        let heard = &mut self.heard;
+        let on_event = &mut self.on_event;
         self.listener.feed(&buffer[..count], |listener, event| {
             if let Event::Message(_, Message::Reply(reply)) = event
                 && Some(reply.request) == id
             {
                 outcome = Some(reply.outcome);
             }
-            heard(listener, event);
+            on_event(listener, event);
         });
         Ok(outcome)
     }

@@ -25,11 +25,11 @@ const Q16: f64 = 65536.0;
 pub fn event(event: Event<'_>) -> String {
     match event {
         Event::Damaged(error) => format!("damaged: {error}"),
-        Event::Message(header, said) => match header.arrival {
-            Arrival::AfterGap { lost } => format!("{} (after {lost} lost frames)", message(said)),
-            Arrival::Late => format!("{} (late, not counted)", message(said)),
-            Arrival::Restart => format!("{} (the robot has started anew)", message(said)),
-            Arrival::First | Arrival::InOrder => message(said),
+        Event::Message(header, received) => match header.arrival {
+            Arrival::AfterGap { lost } => format!("{} (after {lost} lost frames)", message(received)),
+            Arrival::Late => format!("{} (late, not counted)", message(received)),
+            Arrival::Restart => format!("{} (the robot has restarted)", message(received)),
+            Arrival::First | Arrival::InOrder => message(received),
         },
     }
 }

@@ -5,13 +5,13 @@
 //! use std::sync::mpsc::channel;
 //!
 //! use toposlam_link::broadcast::Broadcast;
-//! use toposlam_link::link::{Link, News, Options, Source};
+//! use toposlam_link::link::{Link, LinkEvent, Options, Source};
 //!
 //! let mut robot = Broadcast::bind("127.0.0.1:0")?;
-//! let (sender, news) = channel();
+//! let (sender, events) = channel();
 //! let source = Source::named(&format!("tcp:{}", robot.address()?), 115_200);
-//! let _link = Link::start(source, Options::default(), move |news| sender.send(news).is_ok());
-//! assert!(matches!(news.recv()?, News::Connected));
+//! let _link = Link::start(source, Options::default(), move |event| sender.send(event).is_ok());
+//! assert!(matches!(events.recv()?, LinkEvent::Connected));
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
@@ -52,7 +52,7 @@ impl Source {
 
     /// Only a TCP connection can fail without notice to either end. Reopening a serial port may reset the board, and a
     /// robot may be silent.
-    fn can_die_silently(&self) -> bool {
+    fn can_fail_silently(&self) -> bool {
         matches!(self, Self::Line(name, _) if name.starts_with("tcp:"))
     }
 }
@@ -85,7 +85,7 @@ impl Default for Options {
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Task {
     /// Send one command.
-    Tell(Command),
+    Command(Command),
     /// Fetch a snapshot and write it to a file, replacing an existing one.
     Snapshot(PathBuf),
     /// Send the snapshot in a file; the robot replaces its map with it.
@@ -95,17 +95,17 @@ pub enum Task {
 impl fmt::Display for Task {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Self::Tell(Command::Info) => f.write_str("info"),
-            Self::Tell(Command::GetMap) => f.write_str("get the map"),
-            Self::Tell(Command::Reset) => f.write_str("reset"),
-            Self::Tell(Command::SetConfig(setting)) => write!(f, "set {setting:?}"),
-            Self::Tell(Command::LocaliseOnly { on: true }) => f.write_str("localise only"),
-            Self::Tell(Command::LocaliseOnly { on: false }) => f.write_str("go on mapping"),
-            Self::Tell(Command::GoTo { vertex }) => write!(f, "go to {vertex}"),
-            Self::Tell(Command::Explore) => f.write_str("explore"),
-            Self::Tell(Command::Pause { on: true }) => f.write_str("pause"),
-            Self::Tell(Command::Pause { on: false }) => f.write_str("go on"),
-            Self::Tell(other) => write!(f, "{other:?}"),
+            Self::Command(Command::Info) => f.write_str("info"),
+            Self::Command(Command::GetMap) => f.write_str("get the map"),
+            Self::Command(Command::Reset) => f.write_str("reset"),
+            Self::Command(Command::SetConfig(setting)) => write!(f, "set {setting:?}"),
+            Self::Command(Command::LocaliseOnly { on: true }) => f.write_str("localise only"),
+            Self::Command(Command::LocaliseOnly { on: false }) => f.write_str("continue mapping"),
+            Self::Command(Command::GoTo { vertex }) => write!(f, "go to {vertex}"),
+            Self::Command(Command::Explore) => f.write_str("explore"),
+            Self::Command(Command::Pause { on: true }) => f.write_str("pause"),
+            Self::Command(Command::Pause { on: false }) => f.write_str("resume"),
+            Self::Command(other) => write!(f, "{other:?}"),
             Self::Snapshot(file) => write!(f, "snapshot to {}", file.display()),
             Self::Restore(file) => write!(f, "restore {}", file.display()),
         }
@@ -160,27 +160,27 @@ impl From<io::Error> for TaskError {
 
 /// An event of a link.
 #[derive(Debug)]
-pub enum News {
+pub enum LinkEvent {
     /// The line is open.
     Connected,
     /// The line failed or cannot be opened. The link retries; a repeated failure for the same reason is not reported.
     Disconnected(String),
-    /// The standard input has ended; no more news follows.
+    /// The standard input has ended; no event follows.
     Ended,
     /// `Ok`: a message; `Err`: a decoding error. Each with the state of the robot after it.
-    Heard(Result<(Header, Message), DecodeError>, Box<Listener>),
+    Received(Result<(Header, Message), DecodeError>, Box<Listener>),
     /// The result of a task.
-    Answered(Task, Result<Answer, TaskError>),
+    TaskDone(Task, Result<Answer, TaskError>),
 }
 
-impl News {
+impl LinkEvent {
     /// An owned copy of a listener's event.
-    pub fn heard(listener: &Listener, event: Event<'_>) -> Self {
+    pub fn received(listener: &Listener, event: Event<'_>) -> Self {
         let event = match event {
             Event::Message(header, message) => Ok((header, *message)),
             Event::Damaged(error) => Err(error),
         };
-        Self::Heard(event, Box::new(listener.clone()))
+        Self::Received(event, Box::new(listener.clone()))
     }
 }
 
@@ -191,45 +191,45 @@ pub struct Link {
 }
 
 impl Link {
-    /// Starts a link. The link's thread calls `tell` with all news until it returns `false`.
-    pub fn start(source: Source, options: Options, tell: impl FnMut(News) -> bool + Send + 'static) -> Self {
+    /// Starts a link. The thread of the link calls `on_event` with each event until it returns `false`.
+    pub fn start(source: Source, options: Options, on_event: impl FnMut(LinkEvent) -> bool + Send + 'static) -> Self {
         let (sender, tasks) = channel();
-        thread::spawn(move || Far { source, options, tasks, tell: Teller::new(tell) }.run());
+        thread::spawn(move || Worker { source, options, tasks, events: EventSink::new(on_event) }.run());
         Self { tasks: sender }
     }
 
-    /// Queues a task; [`News::Answered`] has its result. Tasks run one after the other.
+    /// Queues a task; [`LinkEvent::TaskDone`] has its result. Tasks run one after the other.
     pub fn start_task(&self, task: Task) {
         // A link that has ended has already reported it.
         let _ = self.tasks.send(task);
     }
 }
 
-/// The link's thread.
-struct Far<TELL> {
+/// The thread of the link.
+struct Worker<F> {
     source: Source,
     options: Options,
     tasks: Receiver<Task>,
-    tell: Teller<TELL>,
+    events: EventSink<F>,
 }
 
-/// The receiver of the news is gone.
-struct Alone;
+/// The link was dropped, or the callback returned `false`.
+struct Ended;
 
-impl<TELL: FnMut(News) -> bool> Far<TELL> {
+impl<F: FnMut(LinkEvent) -> bool> Worker<F> {
     fn run(self) {
-        // The owner that ended the link needs no more news.
-        let _: Result<(), Alone> = self.connect_again_and_again();
+        // The owner has ended the link.
+        let _: Result<(), Ended> = self.reconnect_until_ended();
     }
 
-    fn connect_again_and_again(&self) -> Result<(), Alone> {
+    fn reconnect_until_ended(&self) -> Result<(), Ended> {
         let mut client: Option<Client<Box<dyn Line>, _>> = None;
         let mut last_reason = String::new();
         loop {
             let reason = match self.source.open() {
                 Ok(line) => {
                     last_reason.clear();
-                    self.tell.say(News::Connected)?;
+                    self.events.emit(LinkEvent::Connected)?;
                     let client = match &mut client {
                         Some(client) => {
                             client.reconnect(line);
@@ -242,83 +242,87 @@ impl<TELL: FnMut(News) -> bool> Far<TELL> {
                 Err(error) => format!("{error:#}"),
             };
             if self.source == Source::Input {
-                return self.tell.say(News::Ended);
+                return self.events.emit(LinkEvent::Ended);
             }
             if reason != last_reason {
-                self.tell.say(News::Disconnected(reason.clone()))?;
+                self.events.emit(LinkEvent::Disconnected(reason.clone()))?;
                 last_reason = reason;
             }
-            self.refuse_meanwhile()?;
+            self.refuse_tasks_until_retry()?;
         }
     }
 
     fn client_on(&self, line: Box<dyn Line>) -> Client<Box<dyn Line>, impl FnMut(&Listener, Event<'_>)> {
-        let heard = |listener: &Listener, event: Event<'_>| self.tell.hear(News::heard(listener, event));
-        let mut client = Client::new(line, rand::random(), heard);
+        let on_event =
+            |listener: &Listener, event: Event<'_>| self.events.emit_received(LinkEvent::received(listener, event));
+        let mut client = Client::new(line, rand::random(), on_event);
         client.timeout = self.options.reply;
         client.attempts = self.options.attempts;
         client
     }
 
     /// Receives and executes tasks until the line fails; returns the reason.
-    fn serve(&self, client: &mut Client<Box<dyn Line>, impl FnMut(&Listener, Event<'_>)>) -> Result<Cut, Alone> {
-        self.tell.heard_at.set(Instant::now());
+    fn serve(
+        &self,
+        client: &mut Client<Box<dyn Line>, impl FnMut(&Listener, Event<'_>)>,
+    ) -> Result<LineFailure, Ended> {
+        self.events.received_at.set(Instant::now());
         loop {
             match self.tasks.try_recv() {
                 Ok(task) => {
                     let answer = perform(client, &task);
                     let failed = matches!(answer, Err(TaskError::Client(ClientError::Line(_))));
-                    self.tell.say(News::Answered(task, answer))?;
+                    self.events.emit(LinkEvent::TaskDone(task, answer))?;
                     if failed {
-                        return Ok(Cut::WhileTelling);
+                        return Ok(LineFailure::DuringTask);
                     }
                 }
                 Err(TryRecvError::Empty) => {}
-                Err(TryRecvError::Disconnected) => return Err(Alone),
+                Err(TryRecvError::Disconnected) => return Err(Ended),
             }
             match client.listen() {
                 Ok(()) => {}
                 Err(ClientError::Line(error)) if error.kind() == io::ErrorKind::UnexpectedEof => {
-                    return Ok(Cut::Closed);
+                    return Ok(LineFailure::Closed);
                 }
-                Err(ClientError::Line(error)) => return Ok(Cut::Failed(error.to_string())),
-                Err(error) => return Ok(Cut::Failed(error.to_string())),
+                Err(ClientError::Line(error)) => return Ok(LineFailure::Failed(error.to_string())),
+                Err(error) => return Ok(LineFailure::Failed(error.to_string())),
             }
-            self.tell.check()?;
-            if self.source.can_die_silently() && self.tell.heard_at.get().elapsed() > self.options.silence {
-                return Ok(Cut::Silent(self.options.silence));
+            self.events.check()?;
+            if self.source.can_fail_silently() && self.events.received_at.get().elapsed() > self.options.silence {
+                return Ok(LineFailure::Silent(self.options.silence));
             }
         }
     }
 
     /// Waits before the next attempt; tasks that arrive meanwhile fail.
-    fn refuse_meanwhile(&self) -> Result<(), Alone> {
+    fn refuse_tasks_until_retry(&self) -> Result<(), Ended> {
         let deadline = Instant::now() + self.options.retry;
         loop {
             match self.tasks.recv_timeout(deadline.saturating_duration_since(Instant::now())) {
-                Ok(task) => self.tell.say(News::Answered(task, Err(TaskError::NotConnected)))?,
+                Ok(task) => self.events.emit(LinkEvent::TaskDone(task, Err(TaskError::NotConnected)))?,
                 Err(RecvTimeoutError::Timeout) => return Ok(()),
-                Err(RecvTimeoutError::Disconnected) => return Err(Alone),
+                Err(RecvTimeoutError::Disconnected) => return Err(Ended),
             }
         }
     }
 }
 
 /// Why a line is no longer used.
-enum Cut {
+enum LineFailure {
     Closed,
     Failed(String),
-    WhileTelling,
+    DuringTask,
     Silent(Duration),
 }
 
-impl fmt::Display for Cut {
+impl fmt::Display for LineFailure {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Closed => f.write_str("the other end closed the line"),
             Self::Failed(error) => write!(f, "the line failed: {error}"),
-            Self::WhileTelling => f.write_str("the line failed while the robot was told something"),
-            Self::Silent(time) => write!(f, "nothing was heard for {:.1} s", time.as_secs_f64()),
+            Self::DuringTask => f.write_str("the line failed during a task"),
+            Self::Silent(time) => write!(f, "no data for {:.1} s", time.as_secs_f64()),
         }
     }
 }
@@ -328,7 +332,7 @@ fn perform(
     task: &Task,
 ) -> Result<Answer, TaskError> {
     Ok(match task {
-        Task::Tell(command) => Answer::Outcome(client.request(*command)?),
+        Task::Command(command) => Answer::Outcome(client.request(*command)?),
         Task::Snapshot(file) => {
             let snapshot = client.snapshot()?;
             std::fs::write(file, &snapshot)?;
@@ -342,33 +346,33 @@ fn perform(
     })
 }
 
-/// Sends news; shared by the client's callback and the link.
-struct Teller<TELL> {
-    tell: RefCell<TELL>,
-    listened_to: Cell<bool>,
-    heard_at: Cell<Instant>,
+/// Passes events to the owner of the link; shared by the client's callback and the thread.
+struct EventSink<F> {
+    on_event: RefCell<F>,
+    is_open: Cell<bool>,
+    received_at: Cell<Instant>,
 }
 
-impl<TELL: FnMut(News) -> bool> Teller<TELL> {
-    fn new(tell: TELL) -> Self {
-        Self { tell: RefCell::new(tell), listened_to: Cell::new(true), heard_at: Cell::new(Instant::now()) }
+impl<F: FnMut(LinkEvent) -> bool> EventSink<F> {
+    fn new(on_event: F) -> Self {
+        Self { on_event: RefCell::new(on_event), is_open: Cell::new(true), received_at: Cell::new(Instant::now()) }
     }
 
-    fn say(&self, news: News) -> Result<(), Alone> {
-        if self.listened_to.get() && !(self.tell.borrow_mut())(news) {
-            self.listened_to.set(false);
+    fn emit(&self, event: LinkEvent) -> Result<(), Ended> {
+        if self.is_open.get() && !(self.on_event.borrow_mut())(event) {
+            self.is_open.set(false);
         }
         self.check()
     }
 
-    fn hear(&self, news: News) {
-        self.heard_at.set(Instant::now());
-        // The link checks after each read whether the receiver still exists.
-        let _ = self.say(news);
+    fn emit_received(&self, event: LinkEvent) {
+        self.received_at.set(Instant::now());
+        // The thread checks after each read whether the owner still exists.
+        let _ = self.emit(event);
     }
 
-    fn check(&self) -> Result<(), Alone> {
-        if self.listened_to.get() { Ok(()) } else { Err(Alone) }
+    fn check(&self) -> Result<(), Ended> {
+        if self.is_open.get() { Ok(()) } else { Err(Ended) }
     }
 }
 

@@ -125,25 +125,25 @@ impl Listener {
     }
 
     /// Decodes bytes in pieces of any length. Calls back with each event and with the listener's state after it.
-    pub fn feed(&mut self, bytes: &[u8], mut heard: impl FnMut(&Self, Event<'_>)) {
+    pub fn feed(&mut self, bytes: &[u8], mut on_event: impl FnMut(&Self, Event<'_>)) {
         let mut rest = bytes;
         loop {
             rest = match self.decoder.feed(rest) {
                 Progress::NeedsMore => return,
                 Progress::Error { error, rest } => {
-                    heard(self, Event::Damaged(error));
+                    on_event(self, Event::Damaged(error));
                     rest
                 }
                 Progress::Message { header, message, rest } => {
-                    self.take_in(header, &message);
-                    heard(self, Event::Message(header, &message));
+                    self.update(header, &message);
+                    on_event(self, Event::Message(header, &message));
                     rest
                 }
             };
         }
     }
 
-    fn take_in(&mut self, header: Header, message: &Message) {
+    fn update(&mut self, header: Header, message: &Message) {
         self.replica.apply(header, message);
         match header.arrival {
             Arrival::Late => return,
@@ -161,8 +161,8 @@ impl Listener {
     }
 
     /// Prepares for a reopened line: keeps the state and discards an incomplete frame.
-    pub fn reconnected(&mut self, mut heard: impl FnMut(&Self, Event<'_>)) {
-        self.feed(&[0], &mut heard);
+    pub fn reconnected(&mut self, mut on_event: impl FnMut(&Self, Event<'_>)) {
+        self.feed(&[0], &mut on_event);
     }
 
     /// The replica of the robot's map and state.
@@ -206,7 +206,7 @@ mod tests {
     use super::*;
     use toposlam::wire::{Capacities, Encoder, MAX_FRAME_BYTES, ResetCause};
 
-    fn heard_with(hello: Hello) -> Listener {
+    fn listener_of(hello: Hello) -> Listener {
         let mut frame = [0; MAX_FRAME_BYTES];
         let mut listener = Listener::new();
         listener.feed(Encoder::new(0).encode(&Message::Hello(hello), &mut frame).unwrap(), |_, _| ());
@@ -225,12 +225,12 @@ mod tests {
             sonars: 16,
         };
         let hello = Hello::new(1, ResetCause::PowerOn, 1, capacities);
-        assert_eq!(heard_with(hello).understanding(), Understanding::Whole);
+        assert_eq!(listener_of(hello).understanding(), Understanding::Whole);
         let newer = Hello { protocol_version: PROTOCOL_VERSION + 1, ..hello };
-        let text = heard_with(newer).understanding().to_string();
+        let text = listener_of(newer).understanding().to_string();
         assert!(text.contains("version 6, this program 5"), "{text}");
         let other = Hello { schema_hash: 7, ..hello };
-        assert!(matches!(heard_with(other).understanding(), Understanding::Not(_)));
+        assert!(matches!(listener_of(other).understanding(), Understanding::Not(_)));
     }
 
     #[test]

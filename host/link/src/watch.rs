@@ -2,19 +2,19 @@
 //!
 //! ```
 //! use toposlam::wire::{Encoder, MAX_FRAME_BYTES, Message};
-//! use toposlam_link::{link::News, listener::Listener, watch::Watch};
+//! use toposlam_link::{link::LinkEvent, listener::Listener, watch::Watch};
 //!
 //! let mut watch = Watch::new("tcp:robot:7070");
 //! let (mut listener, mut frame) = (Listener::new(), [0; MAX_FRAME_BYTES]);
 //! let edge = Message::Edge { a: 0, b: 1, present: true };
-//! listener.feed(Encoder::new(0).encode(&edge, &mut frame)?, |listener, event| watch.hear(News::heard(listener, event)));
+//! listener.feed(Encoder::new(0).encode(&edge, &mut frame)?, |listener, event| watch.apply(LinkEvent::received(listener, event)));
 //! watch.arrange();
 //! assert_eq!((watch.map().edges.as_slice(), watch.points().len()), ([(0, 1)].as_slice(), 2));
 //! # Ok::<(), toposlam::wire::EncodeError>(())
 //! ```
 
 use crate::layout::{Layout, Point};
-use crate::link::News;
+use crate::link::LinkEvent;
 use crate::listener::Listener;
 use crate::topology::TopologicalMap;
 
@@ -26,12 +26,12 @@ pub enum Connection {
     /// Open.
     Open,
     /// Closed for this reason; the link retries.
-    Cut(String),
+    Lost(String),
     /// The standard input has ended.
     Ended,
 }
 
-/// Processes the news of a link, and keeps the layout of the map.
+/// Processes the events of a link, and keeps the layout of the map.
 #[derive(Clone, Debug)]
 pub struct Watch {
     line: String,
@@ -54,18 +54,18 @@ impl Watch {
     }
 
     /// Processes one event of the link.
-    pub fn hear(&mut self, news: News) {
-        match news {
-            News::Connected => self.connection = Connection::Open,
-            News::Disconnected(reason) => self.connection = Connection::Cut(reason),
-            News::Ended => self.connection = Connection::Ended,
-            News::Heard(event, listener) => {
+    pub fn apply(&mut self, event: LinkEvent) {
+        match event {
+            LinkEvent::Connected => self.connection = Connection::Open,
+            LinkEvent::Disconnected(reason) => self.connection = Connection::Lost(reason),
+            LinkEvent::Ended => self.connection = Connection::Ended,
+            LinkEvent::Received(event, listener) => {
                 if let Ok((header, message)) = &event {
-                    self.layout.hear(*header, message);
+                    self.layout.apply(*header, message);
                 }
                 self.listener = *listener;
             }
-            News::Answered(..) => {}
+            LinkEvent::TaskDone(..) => {}
         }
     }
 

@@ -37,7 +37,13 @@ pub(crate) fn any_exit() -> Option<Exit> {
 }
 
 pub(crate) fn any_passage() -> Passage {
-    Passage { exit: any_exit(), travel_frames: black_box(Some(3)), entry_mrad: black_box(Some(3)) }.opaque()
+    Passage {
+        exit: any_exit(),
+        travel_frames: black_box(Some(3)),
+        entry_mrad: black_box(Some(3)),
+        returns: black_box(false),
+    }
+    .opaque()
 }
 
 pub(crate) fn ordered<const N: usize, const V: usize, const D: usize, const T: usize>(

@@ -151,7 +151,7 @@ impl<const V: usize> MapReplica<V> {
     }
 
     /// Every edge once, as pairs of vertices with the smaller id first. Parallel edges count as one;
-    /// [`MapReplica::ways`] tells them apart.
+    /// [`MapReplica::ways`] distinguishes them.
     pub fn edges(&self) -> impl Iterator<Item = (u8, u8)> + '_ {
         let later = |a, &b: &u8| a <= b;
         let neighbours = |a| VertexSet::from_bits(self.neighbours(a)).iter().map(u8::from);

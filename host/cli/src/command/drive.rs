@@ -1,9 +1,9 @@
 //! Options and summary shared by `simulate` and `emulate`.
 
 use std::ops::RangeInclusive;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
-use anyhow::Context;
+use anyhow::{Context, ensure};
 use clap::Args;
 use toposlam::persist::Persist;
 use toposlam::reference::SONARS;
@@ -18,9 +18,12 @@ use toposlam_sim::world::{GroundTruth, Plan, RobotModel, TrueMap};
 /// The floor plan, the seed and the noise.
 #[derive(Args)]
 pub(super) struct DriveArguments {
-    /// Floor plan: ring, office, flat, grid, plus, comb, ladder, or a text file (docs/driving.md).
+    /// Floor plan: the name of a built-in plan, or a file (docs/plans.md).
     #[arg(long, default_value = "office")]
     plan: String,
+    /// Start of the robot, in metres in the frame of the plan [default: the start of the plan, or its most open place].
+    #[arg(long, value_name = "X,Y", value_parser = start, allow_hyphen_values = true)]
+    start: Option<(f64, f64)>,
     /// Seed of the drive and of all noise.
     #[arg(long, default_value_t = 1)]
     seed: u64,
@@ -54,7 +57,7 @@ impl DriveArguments {
 
     /// The floor plan, and a robot with this many sonars and its noise.
     pub(super) fn world_for_ring(&self, sonars: usize) -> anyhow::Result<(Plan, RobotModel)> {
-        Ok((load_plan(&self.plan)?, RobotModel::for_ring(sonars).with_noise(self.noise)))
+        Ok((load_plan(&self.plan, self.start)?, RobotModel::for_ring(sonars).with_noise(self.noise)))
     }
 
     /// The floor plan argument.
@@ -139,13 +142,26 @@ fn yes_or_no(answer: bool) -> &'static str {
     if answer { "yes" } else { "no" }
 }
 
-/// Loads a built-in plan by name, or one from a file.
-pub(super) fn load_plan(name_or_file: &str) -> anyhow::Result<Plan> {
-    if let Some(plan) = Plan::built_in(name_or_file) {
-        return Ok(plan);
-    }
-    let text = std::fs::read_to_string(name_or_file).with_context(|| {
-        format!("{name_or_file:?} is neither a built-in floor plan (ring, office, flat, grid, plus, comb, ladder) nor a readable file")
-    })?;
-    Plan::parse(&text).with_context(|| format!("floor plan {name_or_file}"))
+/// A built-in plan by its name, or a plan from a file, with another start if one is given.
+pub(super) fn load_plan(name_or_file: &str, start: Option<(f64, f64)>) -> anyhow::Result<Plan> {
+    let plan = match Plan::built_in(name_or_file) {
+        Some(plan) => plan,
+        None => {
+            let file = Path::new(name_or_file);
+            let names = Plan::BUILT_IN.map(|(name, _)| name).join(", ");
+            ensure!(file.exists(), "{name_or_file:?} is neither a built-in floor plan ({names}) nor a readable file");
+            Plan::load(file).context("floor plan")?
+        }
+    };
+    let Some((x_m, y_m)) = start else { return Ok(plan) };
+    let plan = plan.with_start_m(x_m, y_m);
+    ensure!(!plan.is_wall_at(plan.start()), "--start {x_m},{y_m} is in a wall of {name_or_file} or outside it");
+    Ok(plan)
+}
+
+/// A point in metres, as `x,y`.
+pub(super) fn start(text: &str) -> Result<(f64, f64), String> {
+    let numbers = text.split_once(',').and_then(|(x, y)| Some((x.trim().parse().ok()?, y.trim().parse().ok()?)));
+    let is_finite = |(x, y): &(f64, f64)| x.is_finite() && y.is_finite();
+    numbers.filter(is_finite).ok_or_else(|| "must be x,y in metres".to_owned())
 }

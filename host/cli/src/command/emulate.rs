@@ -148,7 +148,7 @@ where
     });
     let (tell_velocity, velocities) = mpsc::channel::<VelocityCommand>();
     let progress = Progress::new("", arguments.places, "places");
-    let mut heard = Received::new();
+    let mut received = Received::new();
     let mut elsewhere = None;
     let mut frames = 0;
     let (repeated, bar) = (&repetition, &progress);
@@ -177,7 +177,7 @@ where
             Some(frame)
         },
         |bytes, _| {
-            heard.feed(bytes, |message| {
+            received.feed(bytes, |message| {
                 let Ok(repetition) = repetition.lock() else { return ControlFlow::Break(()) };
                 let is_same = match message {
                     Message::Velocity(drive) => {
@@ -209,51 +209,57 @@ where
 
     let Ok(Repetition { exploration, .. }) = repetition.into_inner() else { bail!("the simulation failed") };
     arguments.drive.summarise(&Summary::of(&plan, &exploration))?;
-    let counters = heard.decoder.counters();
-    let Some(health) = heard.replica.health() else { bail!("the firmware sent no Health message") };
-    println!("firmware: {} places in {} frames, {:.1} s", heard.places.len(), outcome.frames, outcome.seconds);
+    let counters = received.decoder.counters();
+    let Some(health) = received.replica.health() else { bail!("the firmware sent no Health message") };
+    println!("firmware: {} places in {} frames, {:.1} s", received.places.len(), outcome.frames, outcome.seconds);
     println!("wire: {} messages, {} frames lost, {} corrupt", counters.messages, counters.lost, counters.corrupt);
     println!("sensor bus: {} bytes, {} rounds of the loop", outcome.bus_bytes, health.loop_count);
     if let Some(bytes) = outcome.stack_high_water_bytes {
         println!("stack_high_water_bytes: {bytes}");
     }
-    compare(&exploration, &heard)?;
+    compare(&exploration, &received)?;
     println!("drive and map of the firmware and of the simulation are equal bit for bit");
     Ok(())
 }
 
 /// Compares the messages of the firmware with the simulation.
-fn compare<const V: usize, F>(exploration: &Exploration<'_, V, F>, heard: &Received) -> anyhow::Result<()>
+fn compare<const V: usize, F>(exploration: &Exploration<'_, V, F>, received: &Received) -> anyhow::Result<()>
 where
     F: Filter<V, Config: FilterSettings> + Persist,
 {
     let (steps, mapper) = (exploration.steps(), exploration.robot().mapper());
     let map = mapper.map();
     let places = steps.iter().map(|step| (step.update.place_index, step.place.fingerprint.radius_mm()));
-    ensure!(places.eq(heard.places.iter().copied()), "the firmware detected other places than the simulation");
-    ensure!(heard.replica.is_converged(), "the map received over the wire is incomplete");
+    ensure!(places.eq(received.places.iter().copied()), "the firmware detected other places than the simulation");
+    ensure!(received.replica.is_converged(), "the map received over the wire is incomplete");
     let same_rows = map.vertices().all(|vertex| {
-        heard.replica.row(vertex.into()).is_some_and(|row| {
+        received.replica.row(vertex.into()).is_some_and(|row| {
             map.label(vertex).map(|label| label.radius_mm()) == Some(row.radius_mm)
                 && map.visits(vertex) == row.visits
                 && map.neighbours(vertex).bits() == row.neighbours
         })
     });
-    let same_size = usize::from(heard.replica.vertices()) == map.vertices().len();
+    let same_size = usize::from(received.replica.vertices()) == map.vertices().len();
     ensure!(same_rows && same_size, "the map of the firmware differs");
     if let Some(darts) = mapper.filter().darts() {
         let has_ways =
-            |vertex: VertexId| VertexWays::of(darts, vertex).ways.as_slice() == heard.replica.ways(vertex.into());
+            |vertex: VertexId| VertexWays::of(darts, vertex).ways.as_slice() == received.replica.ways(vertex.into());
         ensure!(map.vertices().all(has_ways), "the ways of the firmware's map differ");
     }
     if let Some(step) = steps.last() {
         let (filter, place_index) = (mapper.filter(), step.update.place_index);
-        ensure!(heard.replica.location() == Some(Location::from(&step.update)), "the firmware reports another vertex");
-        ensure!(heard.replica.evidence() == Some(Evidence::from(&step.update)), "the firmware reports other evidence");
+        ensure!(
+            received.replica.location() == Some(Location::from(&step.update)),
+            "the firmware reports another vertex"
+        );
+        ensure!(
+            received.replica.evidence() == Some(Evidence::from(&step.update)),
+            "the firmware reports other evidence"
+        );
         let belief = Some(Belief::of(filter, place_index));
-        ensure!(heard.replica.belief() == belief, "the firmware reports other probabilities");
+        ensure!(received.replica.belief() == belief, "the firmware reports other probabilities");
         let worst = Some(Worst::of(filter, place_index));
-        ensure!(heard.replica.worst() == worst, "the firmware reports another worst n-gram");
+        ensure!(received.replica.worst() == worst, "the firmware reports another worst n-gram");
     }
     Ok(())
 }

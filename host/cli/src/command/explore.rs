@@ -14,7 +14,7 @@ use toposlam_sim::exploration::Exploration;
 use toposlam_sim::injector::FaultRates;
 use toposlam_sim::world::{HintReport, Plan, Report, ReportedHints, RobotModel};
 
-use super::drive::{fault_rate, load_plan, noise_factor, number_in};
+use super::drive::{fault_rate, load_plan, noise_factor, number_in, start};
 use super::filter::FilterArgument;
 
 /// Timeout of a goal, in ring frames.
@@ -23,9 +23,12 @@ const FRAMES_PER_JOURNEY: u64 = 20_000;
 /// Arguments of `toposlam explore`.
 #[derive(Args)]
 pub(crate) struct Arguments {
-    /// Floor plans: ring, office, flat, grid, plus, comb, ladder, or files.
+    /// Floor plans: names of built-in plans, or files (docs/plans.md).
     #[arg(long, value_name = "PLAN,...", value_delimiter = ',', default_value = "office,ring,flat")]
     plans: Vec<String>,
+    /// Start of the robot, in metres in the frame of the only plan [default: the start of the plan, or its most open place].
+    #[arg(long, value_name = "X,Y", value_parser = start, allow_hyphen_values = true)]
+    start: Option<(f64, f64)>,
     /// Factors on every noise of the robot, 0 to 100.
     #[arg(long, value_name = "FACTOR,...", value_delimiter = ',', default_value = "1,2", value_parser = noise_factor)]
     noises: Vec<f64>,
@@ -83,6 +86,7 @@ struct Journeys {
 
 pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     ensure!(arguments.runs > 0, "--runs must be at least 1");
+    ensure!(arguments.start.is_none() || arguments.plans.len() == 1, "--start needs exactly one plan");
     println!(
         "| Plan | Noise | Exact maps | Visited all | Complete | Located | Found / missed / doubled / phantom | Radius error, median / 90 % \
          | Degree seen / right | Way lost | Bumps | Frames per place | Goals reached / commanded / reached elsewhere |"
@@ -90,7 +94,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     println!("|---|---|---|---|---|---|---|---|---|---|---|---|---|");
     let mut rows = Vec::new();
     for name in &arguments.plans {
-        let plan = load_plan(name)?;
+        let plan = load_plan(name, arguments.start)?;
         let one = |arguments: &Arguments, plan: &Plan, noise: f64, seed: u64| match arguments.filter {
             FilterArgument::Ordered => one::<{ ordered::VERTICES }, ordered::Filter>(
                 arguments,

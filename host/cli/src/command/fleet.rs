@@ -37,10 +37,10 @@ pub(crate) struct Arguments {
 
 pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     allow_many_connections().context("opening many connections")?;
-    let (lines, _crowd) = match (&arguments.lines, arguments.simulate) {
+    let (lines, _robots) = match (&arguments.lines, arguments.simulate) {
         (None, Some(count)) => {
-            let (crowd, address) = Crowd::start(count, arguments.speed)?;
-            ((0..count).map(|number| (format!("robot {number}"), address.clone())).collect(), Some(crowd))
+            let (robots, address) = Robots::start(count, arguments.speed)?;
+            ((0..count).map(|number| (format!("robot {number}"), address.clone())).collect(), Some(robots))
         }
         (file, _) => {
             let file = file.as_deref().context("neither a file of lines nor --simulate was given")?;
@@ -133,28 +133,28 @@ impl Sample {
 }
 
 /// The child process that serves recorded robots; it ends with this one.
-struct Crowd(Child);
+struct Robots(Child);
 
-impl Crowd {
+impl Robots {
     /// Starts the process, and returns the address of its robots.
     fn start(count: u32, speed: f64) -> anyhow::Result<(Self, String)> {
-        let mut crowd = Command::new(std::env::current_exe()?)
+        let mut robots = Command::new(std::env::current_exe()?)
             .args(["robots", "--listen", "127.0.0.1:0"])
             .args(["--count", &count.to_string(), "--speed", &speed.to_string()])
             .stdin(Stdio::null())
             .stdout(Stdio::piped())
             .spawn()
             .context("starting the robots")?;
-        let output = crowd.stdout.take();
-        let crowd = Self(crowd);
-        let mut said = String::new();
-        BufReader::new(output.context("the robots have no output")?).read_line(&mut said)?;
-        let (_, address) = said.trim_end().split_once("tcp:").context("the robots did not say where they are")?;
-        Ok((crowd, address.to_owned()))
+        let output = robots.stdout.take();
+        let robots = Self(robots);
+        let mut line = String::new();
+        BufReader::new(output.context("the robots have no output")?).read_line(&mut line)?;
+        let (_, address) = line.trim_end().split_once("tcp:").context("the robots print no address")?;
+        Ok((robots, address.to_owned()))
     }
 }
 
-impl Drop for Crowd {
+impl Drop for Robots {
     fn drop(&mut self) {
         // The process may have ended already.
         let _ = self.0.kill();

@@ -12,12 +12,12 @@ pub(super) struct Interrupt(Arc<AtomicBool>);
 impl Interrupt {
     /// Handles Ctrl-C from now on. A second Ctrl-C ends the program at once.
     pub(super) fn watch() -> std::io::Result<Self> {
-        let told = Arc::new(AtomicBool::new(false));
+        let interrupted = Arc::new(AtomicBool::new(false));
         for signal in [SIGINT, SIGTERM] {
-            flag::register_conditional_shutdown(signal, 1, Arc::clone(&told))?;
-            flag::register(signal, Arc::clone(&told))?;
+            flag::register_conditional_shutdown(signal, 1, Arc::clone(&interrupted))?;
+            flag::register(signal, Arc::clone(&interrupted))?;
         }
-        Ok(Self(told))
+        Ok(Self(interrupted))
     }
 
     pub(super) fn is_told(&self) -> bool {

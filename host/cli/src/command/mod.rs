@@ -1,5 +1,6 @@
 //! The subcommands, one file each, with arguments and implementation. `drive` has the options shared by `simulate` and
-//! `emulate`, `filter` the choice of a filter, `hardship` the emulation with faults, `interrupt` Ctrl-C, `machine` the emulated machine.
+//! `emulate`, `filter` the choice of a filter, `hardship` the emulation with faults, `interrupt` Ctrl-C, `machine` the
+//! emulated machine, `ring_recording` the ring frames of an MCAP file.
 
 pub(crate) mod console;
 mod drive;
@@ -17,6 +18,7 @@ mod machine;
 mod missing;
 pub(crate) mod monitor;
 mod on_graph;
+pub(crate) mod plan;
 #[cfg(feature = "recording")]
 pub(crate) mod play;
 #[cfg(feature = "mqtt")]
@@ -25,6 +27,8 @@ mod received;
 #[cfg(feature = "recording")]
 pub(crate) mod record;
 pub(crate) mod replay;
+#[cfg(feature = "recording")]
+mod ring_recording;
 pub(crate) mod robot;
 pub(crate) mod robots;
 pub(crate) mod serve;

@@ -5,8 +5,8 @@ use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
 use clap::Args;
-use toposlam_cli::publish::{Broker, BrokerNews, Options, Publisher};
-use toposlam_link::link::{Link, News, Options as LinkOptions, Source};
+use toposlam_cli::publish::{Broker, BrokerEvent, Options, Publisher};
+use toposlam_link::link::{Link, LinkEvent, Options as LinkOptions, Source};
 
 use super::interrupt::Interrupt;
 
@@ -38,26 +38,26 @@ pub(crate) struct Arguments {
 pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     let mut options = Options::new(arguments.broker.clone(), &arguments.robot)?;
     options.frames = arguments.frames;
-    let publisher = Publisher::start(options, |news| match news {
-        BrokerNews::Connected => eprintln!("the broker is connected"),
-        BrokerNews::Disconnected(reason) => eprintln!("the broker is away: {reason}"),
+    let publisher = Publisher::start(options, |event| match event {
+        BrokerEvent::Connected => eprintln!("the broker is connected"),
+        BrokerEvent::Disconnected(reason) => eprintln!("the broker is away: {reason}"),
     });
     let publisher = Arc::new(Mutex::new(Some(publisher)));
     let interrupt = Interrupt::watch()?;
     let (sender, ended) = channel();
     let teller = Arc::clone(&publisher);
     let source = Source::named(&arguments.line, arguments.baud);
-    let link = Link::start(source, LinkOptions::default(), move |news| {
-        match &news {
-            News::Connected => eprintln!("the robot is connected"),
-            News::Disconnected(reason) => eprintln!("the robot is away: {reason}"),
+    let link = Link::start(source, LinkOptions::default(), move |event| {
+        match &event {
+            LinkEvent::Connected => eprintln!("the robot is connected"),
+            LinkEvent::Disconnected(reason) => eprintln!("the robot is away: {reason}"),
             _ => {}
         }
         let mut publisher = teller.lock().unwrap_or_else(PoisonError::into_inner);
         let Some(publisher) = publisher.as_mut() else { return false };
-        publisher.hear(&news);
+        publisher.apply(&event);
         // The result matters only while the main thread waits.
-        !matches!(news, News::Ended) || sender.send(()).is_ok()
+        !matches!(event, LinkEvent::Ended) || sender.send(()).is_ok()
     });
     let end = arguments.seconds.map(|seconds| Instant::now() + Duration::from_secs(seconds));
     let is_over = || interrupt.is_told() || end.is_some_and(|end| Instant::now() >= end);

@@ -49,7 +49,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     while lost.is_none() && !is_over(recorder.summary().places) {
         let mut buffer = [0; BUFFER_BYTES];
         match read(&mut line, &mut buffer) {
-            Ok(bytes) => recorder.hear(bytes, (start_time + start.elapsed()).as_nanos() as u64)?,
+            Ok(bytes) => recorder.record(bytes, (start_time + start.elapsed()).as_nanos() as u64)?,
             Err(error) => lost = Some(error),
         }
     }

@@ -9,7 +9,7 @@ use toposlam_link::broadcast::Broadcast;
 use toposlam_sim::exploration::Exploration;
 use toposlam_sim::world::RobotModel;
 
-use super::drive::{load_plan, noise_factor};
+use super::drive::{load_plan, noise_factor, start};
 
 /// Ring frames per second of robot time.
 const FRAMES_PER_SECOND: f64 = 10.0;
@@ -20,9 +20,12 @@ pub(crate) struct Arguments {
     /// Address to listen at, HOST:PORT; port 0 for any free port.
     #[arg(long, default_value = "127.0.0.1:7070")]
     listen: String,
-    /// Floor plan: ring, office, flat, grid, plus, comb, ladder, or a text file (docs/driving.md).
+    /// Floor plan: the name of a built-in plan, or a file (docs/plans.md).
     #[arg(long, default_value = "office")]
     plan: String,
+    /// Start of the robot, in metres in the frame of the plan [default: the start of the plan, or its most open place].
+    #[arg(long, value_name = "X,Y", value_parser = start, allow_hyphen_values = true)]
+    start: Option<(f64, f64)>,
     /// Seed of the drive and of all noise.
     #[arg(long, default_value_t = 1)]
     seed: u64,
@@ -44,7 +47,7 @@ pub(super) fn speed(text: &str) -> Result<f64, String> {
 }
 
 pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
-    let plan = load_plan(&arguments.plan)?;
+    let plan = load_plan(&arguments.plan, arguments.start)?;
     let mut buffer = [0; SNAPSHOT_BYTES];
     let model = RobotModel::default().with_noise(arguments.noise);
     let mut exploration = Exploration::start(&plan, model, arguments.seed, &mut buffer)?;
@@ -56,8 +59,8 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     while arguments.places == 0 || exploration.places() < arguments.places {
         exploration.advance();
         let board = exploration.board();
-        let heard = broadcast.exchange(&board.sent);
-        board.received.extend(heard);
+        let received = broadcast.exchange(&board.sent);
+        board.received.extend(received);
         next_frame += frame_time;
         std::thread::sleep(next_frame.saturating_duration_since(Instant::now()));
     }

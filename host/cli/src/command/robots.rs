@@ -5,7 +5,7 @@ use std::time::{Duration, Instant};
 use anyhow::Context;
 use clap::Args;
 use toposlam_cli::fleet::cost::allow_many_connections;
-use toposlam_cli::fleet::crowd::{Afterwards, Crowd, Life, Pace};
+use toposlam_cli::fleet::replay_server::{AtEnd, Pace, RecordedStream, ReplayServer};
 
 use super::drive::load_plan;
 
@@ -38,21 +38,21 @@ pub(super) fn pace(text: &str) -> Result<f64, String> {
 
 pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     allow_many_connections().context("opening many connections")?;
-    let mut lives = Vec::new();
+    let mut streams = Vec::new();
     for (plan, seed) in LIVES {
-        let life = Life::record(&load_plan(plan)?, seed, arguments.frames as usize)?;
-        eprintln!("recorded {plan}: {} ring frames, {} bytes", life.frames(), life.bytes());
-        lives.push(life);
+        let recorded = RecordedStream::record(&load_plan(plan, None)?, seed, arguments.frames as usize)?;
+        eprintln!("recorded {plan}: {} ring frames, {} bytes", recorded.frames(), recorded.bytes());
+        streams.push(recorded);
     }
     let pace = if arguments.speed == 0.0 { Pace::Unbounded } else { Pace::Times(arguments.speed) };
-    let mut crowd = Crowd::bind(&arguments.listen, lives, arguments.count as usize, Afterwards::Again)
+    let mut server = ReplayServer::bind(&arguments.listen, streams, arguments.count as usize, AtEnd::Restart)
         .with_context(|| format!("listening at {}", arguments.listen))?;
-    println!("{} robots listen at tcp:{}", arguments.count, crowd.address()?);
+    println!("{} robots listen at tcp:{}", arguments.count, server.address()?);
     let mut lived = Instant::now();
-    while crowd.met() == 0 || crowd.heard() > 0 {
+    while server.accepted() == 0 || server.connected() > 0 {
         let time = lived.elapsed();
         lived += time;
-        if crowd.live(time, pace) == 0 || pace != Pace::Unbounded {
+        if server.send(time, pace) == 0 || pace != Pace::Unbounded {
             std::thread::sleep(TURN.saturating_sub(lived.elapsed()));
         }
     }

@@ -6,14 +6,17 @@ use toposlam_eval::soak::{Soak, TURNS_PER_HOUR};
 use toposlam_sim::injector::FaultRates;
 use toposlam_sim::world::RobotModel;
 
-use super::drive::{fault_rate, load_plan, noise_factor};
+use super::drive::{fault_rate, load_plan, noise_factor, start};
 
 /// Arguments of `toposlam soak`.
 #[derive(Args)]
 pub(crate) struct Arguments {
-    /// Floor plan: ring, office, flat, grid, plus, comb, ladder, or a text file (docs/driving.md).
+    /// Floor plan: the name of a built-in plan, or a file (docs/plans.md).
     #[arg(long, default_value = "office")]
     plan: String,
+    /// Start of the robot, in metres in the frame of the plan [default: the start of the plan, or its most open place].
+    #[arg(long, value_name = "X,Y", value_parser = start, allow_hyphen_values = true)]
+    start: Option<(f64, f64)>,
     /// Seed of the world, of all noise and of the faults.
     #[arg(long, default_value_t = 1)]
     seed: u64,
@@ -33,7 +36,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     let model = RobotModel::default().with_noise(arguments.noise);
     let rates = FaultRates::scaled(arguments.faults);
     let soak = Soak { model, rates, seed: arguments.seed, turns: arguments.hours.saturating_mul(TURNS_PER_HOUR) };
-    let life = soak.run(&load_plan(&arguments.plan)?)?;
+    let life = soak.run(&load_plan(&arguments.plan, arguments.start)?)?;
     for line in life.lines() {
         println!("{line}");
     }

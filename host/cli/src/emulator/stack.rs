@@ -24,8 +24,8 @@ pub(super) fn stack_high_water(mut monitor: TcpStream) -> anyhow::Result<usize> 
     writeln!(monitor, "pmemsave {RAM_START:#x} {RAM_BYTES} \"{}\"", dump.display())?;
     writeln!(monitor, "quit")?;
     // The monitor closes the line after it has executed all commands.
-    let mut said = Vec::new();
-    let _ = monitor.read_to_end(&mut said);
+    let mut reply = Vec::new();
+    let _ = monitor.read_to_end(&mut reply);
     let ram = fs::read(&dump).context("reading the machine's memory")?;
     let _ = fs::remove_file(&dump);
     painted_stack(&ram).context("the stack is not painted")

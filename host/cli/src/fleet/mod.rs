@@ -3,7 +3,7 @@
 //! | Module | Purpose |
 //! |---|---|
 //! | [`Fleet`] | the monitoring side: a [`Listener`] for each robot, fed when its line is readable |
-//! | [`crowd`] | the robots' side, for tests and measurements: recorded robots that repeat their streams |
+//! | [`replay_server`] | the robots' side, for tests and measurements: recorded robots that repeat their streams |
 //! | [`cost`] | the resources that this process uses |
 //!
 //! ```
@@ -24,7 +24,7 @@
 //! ```
 
 pub mod cost;
-pub mod crowd;
+pub mod replay_server;
 
 use std::io::{self, ErrorKind, Read};
 use std::net::ToSocketAddrs;
@@ -158,11 +158,15 @@ impl Fleet {
     }
 
     /// Waits for data, at most for `timeout`, and reads one piece from every robot that has some, so that a robot that
-    /// never pauses does not block the others. `heard` gets the robot's index, its listener, and the event.
+    /// never pauses does not block the others. `on_event` gets the robot's index, its listener, and the event.
     ///
     /// # Errors
     /// If the operating system fails; a failed line is not an error.
-    pub fn listen(&mut self, timeout: Duration, mut heard: impl FnMut(usize, &Listener, Event<'_>)) -> io::Result<()> {
+    pub fn listen(
+        &mut self,
+        timeout: Duration,
+        mut on_event: impl FnMut(usize, &Listener, Event<'_>),
+    ) -> io::Result<()> {
         let timeout = if self.ready.is_empty() { timeout } else { Duration::ZERO };
         match self.poll.poll(&mut self.events, Some(timeout)) {
             Err(error) if error.kind() == ErrorKind::Interrupted => return Ok(()),
@@ -179,7 +183,7 @@ impl Fleet {
         let (robots, buffer) = (&mut self.robots, &mut self.buffer);
         self.ready.retain(|&number| {
             let robot = &mut robots[number];
-            robot.is_ready = robot.read(buffer, |listener, event| heard(number, listener, event));
+            robot.is_ready = robot.read(buffer, |listener, event| on_event(number, listener, event));
             robot.is_ready
         });
         Ok(())
@@ -265,7 +269,7 @@ impl Robot {
     }
 
     /// Reads a piece; returns whether there may be more.
-    fn read(&mut self, buffer: &mut [u8], mut heard: impl FnMut(&Listener, Event<'_>)) -> bool {
+    fn read(&mut self, buffer: &mut [u8], mut on_event: impl FnMut(&Listener, Event<'_>)) -> bool {
         self.line.settle();
         let Line::Open(stream) = &mut self.line else { return false };
         let end = match stream.read(buffer) {
@@ -277,7 +281,7 @@ impl Robot {
                     if let Event::Message(_, Message::Place { .. }) = event {
                         *places += 1;
                     }
-                    heard(listener, event);
+                    on_event(listener, event);
                 });
                 return count == buffer.len() || self.is_ending || !SHORT_READ_EMPTIES;
             }

@@ -1,6 +1,6 @@
 //! Fleets of simulated robots over TCP.
 
-use super::crowd::{Afterwards, Crowd, Life, Pace};
+use super::replay_server::{AtEnd, Pace, RecordedStream, ReplayServer};
 use super::*;
 use std::io::Write;
 use std::net::TcpListener;
@@ -10,26 +10,26 @@ const PATIENCE: Duration = Duration::from_millis(5);
 const FRAME: Duration = Duration::from_millis(100);
 const LIFE_FRAMES: usize = 6000;
 
-fn lives() -> Vec<Life> {
+fn streams() -> Vec<RecordedStream> {
     [("office", 1), ("ring", 2)]
-        .map(|(plan, seed)| Life::record(&Plan::built_in(plan).unwrap(), seed, LIFE_FRAMES).unwrap())
+        .map(|(plan, seed)| RecordedStream::record(&Plan::built_in(plan).unwrap(), seed, LIFE_FRAMES).unwrap())
         .into()
 }
 
 #[test]
 fn a_closed_line_and_invalid_data_do_not_affect_other_robots() {
     const ROBOTS: usize = 20;
-    let lives = lives();
-    let maps: Vec<_> = lives.iter().map(|life| life.map().clone()).collect();
+    let streams = streams();
+    let maps: Vec<_> = streams.iter().map(|recorded| recorded.map().clone()).collect();
     assert!(maps.iter().all(|map| map.vertices.len() > 2));
-    let mut crowd = Crowd::bind("127.0.0.1:0", lives, ROBOTS, Afterwards::Silence).unwrap();
+    let mut server = ReplayServer::bind("127.0.0.1:0", streams, ROBOTS, AtEnd::Silence).unwrap();
     let others = TcpListener::bind("127.0.0.1:0").unwrap();
-    let (crowd_address, other_address) =
-        (crowd.address().unwrap().to_string(), others.local_addr().unwrap().to_string());
+    let (robots_address, other_address) =
+        (server.address().unwrap().to_string(), others.local_addr().unwrap().to_string());
 
     let mut fleet = Fleet::new().unwrap();
     for number in 0..ROBOTS {
-        fleet.connect(&format!("robot {number}"), &crowd_address);
+        fleet.connect(&format!("robot {number}"), &robots_address);
     }
     let dying = fleet.connect("dying", &other_address);
     let (mut dying_end, _) = others.accept().unwrap();
@@ -42,15 +42,15 @@ fn a_closed_line_and_invalid_data_do_not_affect_other_robots() {
     dying_end.write_all(&[7, 1, 2]).unwrap();
     drop(dying_end);
     let garbage: Vec<u8> = (0..4096_u32).map(|byte| (byte * 37 % 11) as u8).collect();
-    let (mut said, mut messages) = (0, 0);
+    let (mut sent, mut messages) = (0, 0);
     loop {
-        let piece = crowd.live(Duration::ZERO, Pace::Unbounded);
-        said += piece as u64;
+        let piece = server.send(Duration::ZERO, Pace::Unbounded);
+        sent += piece as u64;
         // Bytes that do not fit, because the fleet is behind, are not sent.
         let _ = nonsense_end.write(&garbage);
         fleet.listen(PATIENCE, |_, _, event| messages += u64::from(matches!(event, Event::Message(..)))).unwrap();
-        let heard: u64 = fleet.robots()[..ROBOTS].iter().map(Robot::bytes).sum();
-        if crowd.met() == ROBOTS && piece == 0 && heard == said && fleet.totals().connecting == 0 {
+        let received: u64 = fleet.robots()[..ROBOTS].iter().map(Robot::bytes).sum();
+        if server.accepted() == ROBOTS && piece == 0 && received == sent && fleet.totals().connecting == 0 {
             break;
         }
     }
@@ -74,13 +74,13 @@ fn a_closed_line_and_invalid_data_do_not_affect_other_robots() {
 
 #[test]
 fn a_restart_of_a_robot_does_not_count_as_lost_frames() {
-    let life = Life::record(&Plan::built_in("flat").unwrap(), 1, 300).unwrap();
-    let twice = 2 * life.bytes() as u64;
-    let mut crowd = Crowd::bind("127.0.0.1:0", vec![life], 1, Afterwards::Again).unwrap();
+    let recorded = RecordedStream::record(&Plan::built_in("flat").unwrap(), 1, 300).unwrap();
+    let twice = 2 * recorded.bytes() as u64;
+    let mut server = ReplayServer::bind("127.0.0.1:0", vec![recorded], 1, AtEnd::Restart).unwrap();
     let mut fleet = Fleet::new().unwrap();
-    fleet.connect("restless", &crowd.address().unwrap().to_string());
+    fleet.connect("restless", &server.address().unwrap().to_string());
     while fleet.totals().bytes <= twice {
-        crowd.live(FRAME, Pace::Times(10.0));
+        server.send(FRAME, Pace::Times(10.0));
         fleet.listen(PATIENCE, |_, _, _| ()).unwrap();
     }
     assert_eq!((fleet.totals().lost, fleet.totals().damaged), (0, 0));

@@ -7,10 +7,10 @@ use std::time::{Duration, Instant};
 use anyhow::{Context, ensure};
 use serde_json::{Value, json};
 
-use toposlam_link::link::{Link, News, Options, Source};
+use toposlam_link::link::{Link, LinkEvent, Options, Source};
 use toposlam_link::{event_text, json};
 
-/// Maximum number of queued news; then the link waits.
+/// Maximum number of queued events; then the link waits.
 const QUEUE: usize = 1024;
 
 /// Output format of events.
@@ -46,19 +46,19 @@ pub fn run(
     mut out: impl Write,
 ) -> anyhow::Result<()> {
     let (sender, inbox) = sync_channel(QUEUE);
-    let _link = Link::start(Source::named(name, baud), options, move |news| sender.send(news).is_ok());
+    let _link = Link::start(Source::named(name, baud), options, move |event| sender.send(event).is_ok());
     let deadline = limits.time.and_then(|time| Instant::now().checked_add(time));
     let mut events = 0;
     while limits.events.is_none_or(|most| events < most) {
         let patience = deadline.map_or(Duration::MAX, |deadline| deadline.saturating_duration_since(Instant::now()));
-        let news = match inbox.recv_timeout(patience) {
-            Ok(news) => news,
+        let event = match inbox.recv_timeout(patience) {
+            Ok(event) => event,
             Err(RecvTimeoutError::Timeout) => break,
             Err(RecvTimeoutError::Disconnected) => break,
         };
-        events += u64::from(matches!(news, News::Heard(..)));
-        let is_over = matches!(news, News::Ended);
-        if let Err(error) = write_line(&news, name, form, &mut out) {
+        events += u64::from(matches!(event, LinkEvent::Received(..)));
+        let is_over = matches!(event, LinkEvent::Ended);
+        if let Err(error) = write_line(&event, name, form, &mut out) {
             // The reader has closed the output.
             return if error.kind() == io::ErrorKind::BrokenPipe { Ok(()) } else { Err(error).context("writing") };
         }
@@ -71,31 +71,31 @@ pub fn run(
     Ok(())
 }
 
-fn write_line(news: &News, name: &str, form: Form, out: &mut impl Write) -> io::Result<()> {
+fn write_line(event: &LinkEvent, name: &str, form: Form, out: &mut impl Write) -> io::Result<()> {
     match form {
-        Form::Words => writeln!(out, "{}", in_words(news, name))?,
-        Form::Json => writeln!(out, "{}", as_json(news, name))?,
+        Form::Words => writeln!(out, "{}", in_words(event, name))?,
+        Form::Json => writeln!(out, "{}", as_json(event, name))?,
     }
     out.flush()
 }
 
-fn in_words(news: &News, name: &str) -> String {
-    match news {
-        News::Connected => format!("connected to {name}"),
-        News::Disconnected(reason) => format!("no line to {name}: {reason}; trying again"),
-        News::Ended => "the input has ended".to_owned(),
-        News::Heard(event, _) => event_text::event(event.into()),
-        News::Answered(task, answer) => format!("{task}: {answer:?}"),
+fn in_words(event: &LinkEvent, name: &str) -> String {
+    match event {
+        LinkEvent::Connected => format!("connected to {name}"),
+        LinkEvent::Disconnected(reason) => format!("no line to {name}: {reason}; trying again"),
+        LinkEvent::Ended => "the input has ended".to_owned(),
+        LinkEvent::Received(event, _) => event_text::event(event.into()),
+        LinkEvent::TaskDone(task, answer) => format!("{task}: {answer:?}"),
     }
 }
 
-fn as_json(news: &News, name: &str) -> Value {
-    match news {
-        News::Connected => json!({"event": "Connected", "line": name}),
-        News::Disconnected(reason) => json!({"event": "Disconnected", "line": name, "reason": reason}),
-        News::Ended => json!({"event": "Ended", "line": name}),
-        News::Heard(event, _) => json::event(event.into()),
-        News::Answered(task, answer) => {
+fn as_json(event: &LinkEvent, name: &str) -> Value {
+    match event {
+        LinkEvent::Connected => json!({"event": "Connected", "line": name}),
+        LinkEvent::Disconnected(reason) => json!({"event": "Disconnected", "line": name, "reason": reason}),
+        LinkEvent::Ended => json!({"event": "Ended", "line": name}),
+        LinkEvent::Received(event, _) => json::event(event.into()),
+        LinkEvent::TaskDone(task, answer) => {
             json!({"event": "Answered", "task": task.to_string(), "answer": format!("{answer:?}")})
         }
     }

@@ -2,7 +2,7 @@
 //!
 //! | Module | Purpose |
 //! |---|---|
-//! | [`model`] | the displayed state; processes news of a [`link`](toposlam_link::link) and keys, and returns actions |
+//! | [`model`] | the displayed state; processes events of a [`link`](toposlam_link::link) and keys, and returns actions |
 //! | [`view`] | draws the model on a ratatui frame, without changing it |
 //! | [`headless`] | writes a line of text for each event instead |
 //! | [`screen`] | the terminal, and the event loop for link, keys and frames |
@@ -14,14 +14,14 @@
 //!
 //! use ratatui::{Terminal, backend::TestBackend};
 //! use toposlam::wire::{Encoder, MAX_FRAME_BYTES, Message};
-//! use toposlam_link::{link::News, listener::Listener};
+//! use toposlam_link::{link::LinkEvent, listener::Listener};
 //! use toposlam_cli::monitor::{model::Model, view};
 //!
 //! let mut model = Model::new("tcp:robot:7070");
 //! let (mut listener, mut frame) = (Listener::new(), [0; MAX_FRAME_BYTES]);
 //! let edge = Message::Edge { a: 0, b: 1, present: true };
 //! listener.feed(Encoder::new(0).encode(&edge, &mut frame)?, |listener, event| {
-//!     model.hear(News::heard(listener, event), Instant::now());
+//!     model.apply(LinkEvent::received(listener, event), Instant::now());
 //! });
 //! model.settle(Instant::now());
 //!

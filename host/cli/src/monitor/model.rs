@@ -1,4 +1,4 @@
-//! Model of the monitor: processes news of the link and keys, and returns actions.
+//! Model of the monitor: processes events of the link and keys, and returns actions.
 //!
 //! Independent of terminal and line; the caller supplies the time.
 
@@ -11,7 +11,7 @@ use toposlam::wire::{Arrival, Command, Header, Info, Message, Outcome};
 
 use super::prompt::{Prompt, Question};
 use toposlam_link::event_text;
-use toposlam_link::link::{Answer, News, Task, TaskError};
+use toposlam_link::link::{Answer, LinkEvent, Task, TaskError};
 use toposlam_link::watch::Watch;
 
 const LOG_LINES: usize = 200;
@@ -20,9 +20,9 @@ const LOG_LINES: usize = 200;
 #[derive(Clone, Debug)]
 pub struct Model {
     watch: Watch,
-    heard_at: Option<Instant>,
-    quiet: Option<Duration>,
-    told: Told,
+    received_at: Option<Instant>,
+    silence: Option<Duration>,
+    reported: Reported,
     waiting: VecDeque<String>,
     log: VecDeque<Entry>,
     prompt: Option<Prompt>,
@@ -67,7 +67,7 @@ pub(super) struct Entry {
 
 /// The robot's mode, as far as its replies confirm it.
 #[derive(Clone, Copy, Debug, Default)]
-pub(super) struct Told {
+pub(super) struct Reported {
     pub(super) paused: Option<bool>,
     pub(super) localise_only: Option<bool>,
     pub(super) info: Option<Info>,
@@ -78,9 +78,9 @@ impl Model {
     pub fn new(line: &str) -> Self {
         Self {
             watch: Watch::new(line),
-            heard_at: None,
-            quiet: None,
-            told: Told::default(),
+            received_at: None,
+            silence: None,
+            reported: Reported::default(),
             waiting: VecDeque::new(),
             log: VecDeque::new(),
             prompt: None,
@@ -91,68 +91,68 @@ impl Model {
     }
 
     /// Processes an event of the link.
-    pub fn hear(&mut self, news: News, now: Instant) {
-        match &news {
-            News::Connected => {
-                self.heard_at = Some(now);
+    pub fn apply(&mut self, event: LinkEvent, now: Instant) {
+        match &event {
+            LinkEvent::Connected => {
+                self.received_at = Some(now);
                 self.note("connected");
             }
-            News::Disconnected(reason) => self.complain(format!("no line: {reason}; trying again")),
-            News::Ended => self.note("the input has ended"),
-            News::Heard(event, _) => {
-                self.heard_at = Some(now);
+            LinkEvent::Disconnected(reason) => self.show_problem(format!("no line: {reason}; trying again")),
+            LinkEvent::Ended => self.note("the input has ended"),
+            LinkEvent::Received(event, _) => {
+                self.received_at = Some(now);
                 if let Ok((header, message)) = event {
-                    self.take_in(*header, message);
+                    self.update(*header, message);
                 }
             }
-            News::Answered(task, answer) => {
+            LinkEvent::TaskDone(task, answer) => {
                 self.waiting.pop_front();
-                self.answered(task, answer);
+                self.task_done(task, answer);
             }
         }
-        self.watch.hear(news);
+        self.watch.apply(event);
     }
 
-    fn take_in(&mut self, header: Header, message: &Message) {
+    fn update(&mut self, header: Header, message: &Message) {
         match header.arrival {
             Arrival::Late => return,
             Arrival::Restart => {
-                self.told = Told::default();
-                self.complain("the robot has started anew".to_owned());
+                self.reported = Reported::default();
+                self.show_problem("the robot has restarted".to_owned());
             }
             Arrival::First | Arrival::InOrder | Arrival::AfterGap { .. } => {}
         }
         match message {
             Message::Remapped(_) | Message::GoalStatus(_) => self.note(event_text::message(message)),
-            Message::Fault { kind, count } if self.is_news(*kind, *count) => {
-                self.complain(event_text::message(message))
+            Message::Fault { kind, count } if self.is_new_fault(*kind, *count) => {
+                self.show_problem(event_text::message(message))
             }
             _ => {}
         }
     }
 
-    fn is_news(&self, kind: u8, count: u32) -> bool {
+    fn is_new_fault(&self, kind: u8, count: u32) -> bool {
         FaultKind::ALL.get(usize::from(kind)).is_none_or(|&kind| self.watch.listener().replica().fault(kind) != count)
     }
 
-    fn answered(&mut self, task: &Task, answer: &Result<Answer, TaskError>) {
+    fn task_done(&mut self, task: &Task, answer: &Result<Answer, TaskError>) {
         match answer {
-            Ok(Answer::Outcome(Outcome::Refused(refusal))) => self.complain(format!("{task}: refused: {refusal}")),
+            Ok(Answer::Outcome(Outcome::Refused(refusal))) => self.show_problem(format!("{task}: refused: {refusal}")),
             Ok(Answer::Outcome(outcome)) => {
                 self.note(format!("{task}: {}", event_text::outcome(outcome)));
                 match (task, outcome) {
                     (_, Outcome::Info(info)) => {
                         let (paused, localise_only) = (Some(info.paused), Some(info.localise_only));
-                        self.told = Told { paused, localise_only, info: Some(*info) };
+                        self.reported = Reported { paused, localise_only, info: Some(*info) };
                     }
-                    (Task::Tell(Command::Pause { on }), _) => self.told.paused = Some(*on),
-                    (Task::Tell(Command::LocaliseOnly { on }), _) => self.told.localise_only = Some(*on),
+                    (Task::Command(Command::Pause { on }), _) => self.reported.paused = Some(*on),
+                    (Task::Command(Command::LocaliseOnly { on }), _) => self.reported.localise_only = Some(*on),
                     _ => {}
                 }
             }
             Ok(Answer::Written(bytes)) => self.note(format!("{task}: {bytes} bytes written")),
             Ok(Answer::Restored(bytes)) => self.note(format!("{task}: {bytes} bytes restored")),
-            Err(error) => self.complain(format!("{task}: {error}")),
+            Err(error) => self.show_problem(format!("{task}: {error}")),
         }
     }
 
@@ -216,11 +216,11 @@ impl Model {
             _ => return None,
         };
         if self.is_read_only() {
-            self.complain("nothing can be told on the standard input".to_owned());
+            self.show_problem("the standard input takes no commands".to_owned());
             return None;
         }
         match wanted {
-            Ok(command) => Some(self.start(Task::Tell(command))),
+            Ok(command) => Some(self.start(Task::Command(command))),
             Err(question) => {
                 self.prompt = Some(Prompt::new(question));
                 None
@@ -235,7 +235,7 @@ impl Model {
             KeyCode::Esc => self.prompt = None,
             KeyCode::Enter => match self.prompt.take()?.answer() {
                 Ok(task) => return Some(self.start(task)),
-                Err(why) => self.complain(why),
+                Err(why) => self.show_problem(why),
             },
             _ => {}
         }
@@ -250,7 +250,7 @@ impl Model {
     /// Arranges the map if it has changed, and updates the time of silence. Call it before drawing.
     pub fn settle(&mut self, now: Instant) {
         self.watch.arrange();
-        self.quiet = self.heard_at.map(|heard_at| now.saturating_duration_since(heard_at));
+        self.silence = self.received_at.map(|received_at| now.saturating_duration_since(received_at));
     }
 
     /// The state of the robot.
@@ -263,12 +263,12 @@ impl Model {
         self.watch.line() == "-"
     }
 
-    pub(super) const fn quiet(&self) -> Option<Duration> {
-        self.quiet
+    pub(super) const fn silence(&self) -> Option<Duration> {
+        self.silence
     }
 
-    pub(super) const fn told(&self) -> Told {
-        self.told
+    pub(super) const fn reported(&self) -> Reported {
+        self.reported
     }
 
     pub(super) fn waiting(&self) -> Option<&str> {
@@ -299,7 +299,7 @@ impl Model {
         self.push(Entry { is_bad: false, text: text.into() });
     }
 
-    fn complain(&mut self, text: String) {
+    fn show_problem(&mut self, text: String) {
         self.push(Entry { is_bad: true, text });
     }
 

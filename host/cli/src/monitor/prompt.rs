@@ -61,7 +61,7 @@ impl Prompt {
         match self.question {
             Question::GoTo => {
                 let vertex = text.parse().map_err(|_| format!("`{text}` is no number of a vertex"))?;
-                Ok(Task::Tell(Command::GoTo { vertex }))
+                Ok(Task::Command(Command::GoTo { vertex }))
             }
             Question::Snapshot => Ok(Task::Snapshot(PathBuf::from(text))),
             Question::Restore => Ok(Task::Restore(PathBuf::from(text))),
@@ -69,9 +69,9 @@ impl Prompt {
                 let (name, value) = text.split_once(' ').ok_or("a setting needs a name and a value")?;
                 let value = value.trim().parse().map_err(|_| format!("`{value}` is no number from 0 to 65535"))?;
                 let setting = setting::named(name, value).ok_or_else(|| format!("there is no setting `{name}`"))?;
-                Ok(Task::Tell(Command::SetConfig(setting)))
+                Ok(Task::Command(Command::SetConfig(setting)))
             }
-            Question::Reset if text == "yes" => Ok(Task::Tell(Command::Reset)),
+            Question::Reset if text == "yes" => Ok(Task::Command(Command::Reset)),
             Question::Reset => Err("not reset".to_owned()),
         }
     }
@@ -90,16 +90,16 @@ mod tests {
 
     #[test]
     fn a_typed_answer_becomes_a_task_or_an_error() {
-        assert_eq!(answer(Question::GoTo, "3"), Ok(Task::Tell(Command::GoTo { vertex: 3 })));
+        assert_eq!(answer(Question::GoTo, "3"), Ok(Task::Command(Command::GoTo { vertex: 3 })));
         assert!(answer(Question::GoTo, "256").unwrap_err().contains("256"));
         assert_eq!(answer(Question::Snapshot, " a b "), Ok(Task::Snapshot("a b".into())));
         assert!(answer(Question::Restore, " ").is_err());
-        let set = Task::Tell(Command::SetConfig(Setting::NoiseMm(40)));
+        let set = Task::Command(Command::SetConfig(Setting::NoiseMm(40)));
         assert_eq!(answer(Question::Setting, "noise-mm  40"), Ok(set));
         for wrong in ["noise-mm", "noise-mm 70000", "colour 3"] {
             assert!(answer(Question::Setting, wrong).is_err(), "{wrong}");
         }
-        assert_eq!(answer(Question::Reset, "yes"), Ok(Task::Tell(Command::Reset)));
+        assert_eq!(answer(Question::Reset, "yes"), Ok(Task::Command(Command::Reset)));
         assert!(answer(Question::Reset, "y").is_err());
     }
 }

@@ -18,21 +18,21 @@ use ratatui::crossterm::terminal::{EnterAlternateScreen, LeaveAlternateScreen, d
 
 use super::model::{Action, Model};
 use super::view;
-use toposlam_link::link::{Link, News, Options, Source};
+use toposlam_link::link::{Link, LinkEvent, Options, Source};
 
-/// Maximum number of queued news; then the link waits.
+/// Maximum number of queued events; then the link waits.
 const QUEUE: usize = 1024;
 /// Delay before drawing: the messages of a place arrive in a burst, and a frame should show all of them.
 const BURST_TIME: Duration = Duration::from_millis(2);
 /// Minimum interval between frames; more are not visible, and a slow connection would fall behind.
 const LEAST_FRAME_TIME: Duration = Duration::from_millis(16);
-/// Interval of redrawing without news, for values that depend on the time.
+/// Interval of redrawing without an event, for values that depend on the time.
 const IDLE_FRAME_TIME: Duration = Duration::from_millis(250);
 /// Polling interval at which the keyboard thread checks whether it should end.
 const KEY_PATIENCE: Duration = Duration::from_millis(100);
 
 enum Input {
-    News(News),
+    Link(LinkEvent),
     Key(KeyEvent),
     Resized,
     Failed(io::Error),
@@ -61,7 +61,7 @@ pub fn run(
     let keys = sender.clone();
     let no_more_keys = Arc::clone(&ended);
     thread::spawn(move || send_keys(&keys, &no_more_keys));
-    let link = Link::start(Source::named(name, baud), options, move |news| sender.send(Input::News(news)).is_ok());
+    let link = Link::start(Source::named(name, baud), options, move |event| sender.send(Input::Link(event)).is_ok());
     let outcome = show(&mut screen, &mut Model::new(name), &link, &inputs, &ended, &mut drawn);
     ended.store(true, Ordering::Relaxed);
     outcome
@@ -90,7 +90,7 @@ fn show(
             let Some(something) = input else { break };
             changed = true;
             match something {
-                Input::News(news) => model.hear(news, Instant::now()),
+                Input::Link(event) => model.apply(event, Instant::now()),
                 Input::Key(key) => match model.press(key) {
                     Some(Action::Quit) => return Ok(()),
                     Some(Action::Start(task)) => link.start_task(task),

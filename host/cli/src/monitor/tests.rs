@@ -14,7 +14,7 @@ use toposlam::wire::{
 
 use super::model::{Action, Model};
 use super::view;
-use toposlam_link::link::{Answer, News, Task, TaskError};
+use toposlam_link::link::{Answer, LinkEvent, Task, TaskError};
 use toposlam_link::listener::Listener;
 use toposlam_link::topology::TopologicalMap;
 use toposlam_sim::exploration::Exploration;
@@ -32,19 +32,19 @@ impl Watch {
     fn new(line: &str) -> Self {
         let (now, listener) = (Instant::now(), Listener::new());
         let mut model = Model::new(line);
-        model.hear(News::Connected, now);
+        model.apply(LinkEvent::Connected, now);
         Self { model, listener, encoder: Encoder::new(0), now }
     }
 
-    fn hear_bytes(&mut self, bytes: &[u8]) {
+    fn receive_bytes(&mut self, bytes: &[u8]) {
         let Self { model, listener, now, .. } = self;
-        listener.feed(bytes, |listener, event| model.hear(News::heard(listener, event), *now));
+        listener.feed(bytes, |listener, event| model.apply(LinkEvent::received(listener, event), *now));
     }
 
-    fn hear(&mut self, message: &Message) {
+    fn receive(&mut self, message: &Message) {
         let mut frame = [0; MAX_FRAME_BYTES];
         let bytes = self.encoder.encode(message, &mut frame).unwrap().to_vec();
-        self.hear_bytes(&bytes);
+        self.receive_bytes(&bytes);
     }
 
     /// The text on a screen of the given size.
@@ -73,7 +73,7 @@ fn office(places: usize) -> (Watch, usize, Vec<u16>) {
     let mut exploration = Exploration::start(&plan, RobotModel::default(), 1, &mut buffer).unwrap();
     while exploration.places() < places {
         exploration.advance();
-        watch.hear_bytes(&exploration.board().sent);
+        watch.receive_bytes(&exploration.board().sent);
     }
     let map = TopologicalMap::of(exploration.robot().mapper().filter());
     let radii = map.vertices.iter().map(|vertex| vertex.radius_mm).collect();
@@ -142,14 +142,14 @@ fn the_vertex_table_scrolls() {
 #[test]
 fn another_version_shows_a_banner_and_another_schema_an_alarm() {
     let mut watch = Watch::new("tcp:robot:7070");
-    watch.hear(&Message::Hello(hello()));
+    watch.receive(&Message::Hello(hello()));
     let screen = watch.screen(100, 30);
     assert!(!screen.contains("version") && screen.contains("start 3 (the watchdog was not fed in time)"), "{screen}");
     let theirs = PROTOCOL_VERSION + 1;
-    watch.hear(&Message::Hello(Hello { protocol_version: theirs, ..hello() }));
+    watch.receive(&Message::Hello(Hello { protocol_version: theirs, ..hello() }));
     let screen = watch.screen(100, 30);
     assert!(screen.contains(&format!("protocol version {theirs}, this program {PROTOCOL_VERSION}")), "{screen}");
-    watch.hear(&Message::Hello(Hello { schema_hash: 7, ..hello() }));
+    watch.receive(&Message::Hello(Hello { schema_hash: 7, ..hello() }));
     let screen = watch.screen(100, 30);
     assert!(screen.contains("DO NOT TRUST") && screen.contains("0x0000000000000007"), "{screen}");
 }
@@ -158,7 +158,7 @@ fn another_version_shows_a_banner_and_another_schema_an_alarm() {
 fn faults_are_named_and_counted_and_logged_once() {
     let mut watch = Watch::new("tcp:robot:7070");
     for count in [2, 2, 3] {
-        watch.hear(&Message::Fault { kind: 14, count });
+        watch.receive(&Message::Fault { kind: 14, count });
     }
     let screen = watch.screen(120, 40);
     assert!(screen.contains("DriveLost 3"), "{screen}");
@@ -168,12 +168,12 @@ fn faults_are_named_and_counted_and_logged_once() {
 #[test]
 fn lost_and_damaged_frames_are_counted_on_the_screen() {
     let mut watch = Watch::new("tcp:robot:7070");
-    watch.hear(&Message::Edge { a: 0, b: 1, present: true });
+    watch.receive(&Message::Edge { a: 0, b: 1, present: true });
     let mut frame = [0; MAX_FRAME_BYTES];
     let mut damaged = watch.encoder.encode(&Message::Edge { a: 1, b: 2, present: true }, &mut frame).unwrap().to_vec();
     damaged[2] ^= 1;
-    watch.hear_bytes(&damaged);
-    watch.hear(&Message::Edge { a: 2, b: 3, present: true });
+    watch.receive_bytes(&damaged);
+    watch.receive(&Message::Edge { a: 2, b: 3, present: true });
     let screen = watch.screen(140, 40);
     assert!(screen.contains("2 frames, 1 lost, 1 corrupt"), "{screen}");
     assert!(screen.contains("may lack something"), "{screen}");
@@ -184,11 +184,11 @@ fn a_ring_frame_is_drawn_with_its_silent_and_dead_sonars() {
     let mut watch = Watch::new("tcp:robot:7070");
     let count = |screen: &str, mark: char| screen.matches(mark).count();
     let mut echoes = [Echo::Range { range_mm: 900 }; 16];
-    watch.hear(&Message::Ring { frame_index: 11, echoes: Echoes::new(&echoes) });
+    watch.receive(&Message::Ring { frame_index: 11, echoes: Echoes::new(&echoes) });
     let before = watch.screen(140, 45);
     echoes[3] = Echo::Dead;
     echoes[5] = Echo::Silence;
-    watch.hear(&Message::Ring { frame_index: 12, echoes: Echoes::new(&echoes) });
+    watch.receive(&Message::Ring { frame_index: 12, echoes: Echoes::new(&echoes) });
     let screen = watch.screen(140, 45);
     assert!(screen.contains("ring 12, rim at 900 mm"), "{screen}");
     assert_eq!(count(&screen, 'x'), count(&before, 'x') + 1, "{screen}");
@@ -198,13 +198,13 @@ fn a_ring_frame_is_drawn_with_its_silent_and_dead_sonars() {
 #[test]
 fn a_cut_line_and_a_silent_robot_are_reported_at_the_top() {
     let mut watch = Watch::new("tcp:robot:7070");
-    assert!(!watch.screen(80, 24).contains("nothing was heard"));
+    assert!(!watch.screen(80, 24).contains("no data for"));
     watch.now += Duration::from_secs(7);
-    assert!(watch.screen(80, 24).contains("nothing was heard for 7 s"));
-    watch.model.hear(News::Disconnected("the cable is out".to_owned()), watch.now);
+    assert!(watch.screen(80, 24).contains("no data for 7 s"));
+    watch.model.apply(LinkEvent::Disconnected("the cable is out".to_owned()), watch.now);
     let screen = watch.screen(80, 24);
     assert!(screen.contains("no line: the cable is out; trying again"), "{screen}");
-    assert!(!screen.contains("nothing was heard"), "{screen}");
+    assert!(!screen.contains("no data for"), "{screen}");
 }
 
 #[test]
@@ -219,14 +219,14 @@ fn every_command_of_the_wire_has_a_key() {
         ('l', Command::LocaliseOnly { on: true }),
         ('m', Command::LocaliseOnly { on: false }),
     ] {
-        assert_eq!(watch.press(KeyCode::Char(key)), Some(Action::Start(Task::Tell(command))));
+        assert_eq!(watch.press(KeyCode::Char(key)), Some(Action::Start(Task::Command(command))));
     }
     for (key, text, task) in [
-        ('g', "3", Task::Tell(Command::GoTo { vertex: 3 })),
+        ('g', "3", Task::Command(Command::GoTo { vertex: 3 })),
         ('s', "a.snapshot", Task::Snapshot("a.snapshot".into())),
         ('r', "a.snapshot", Task::Restore("a.snapshot".into())),
-        ('t', "noise-mm 40", Task::Tell(Command::SetConfig(toposlam::wire::Setting::NoiseMm(40)))),
-        ('x', "yes", Task::Tell(Command::Reset)),
+        ('t', "noise-mm 40", Task::Command(Command::SetConfig(toposlam::wire::Setting::NoiseMm(40)))),
+        ('x', "yes", Task::Command(Command::Reset)),
     ] {
         assert_eq!(watch.press(KeyCode::Char(key)), None);
         assert_eq!(watch.type_text(text), Some(Action::Start(task)));
@@ -265,19 +265,19 @@ fn the_help_lists_the_keys() {
 #[test]
 fn replies_and_refusals_are_shown() {
     let mut watch = Watch::new("tcp:robot:7070");
-    let go = Task::Tell(Command::GoTo { vertex: 99 });
+    let go = Task::Command(Command::GoTo { vertex: 99 });
     watch.press(KeyCode::Char('g'));
     assert_eq!(watch.type_text("99"), Some(Action::Start(go.clone())));
     assert!(watch.screen(80, 24).contains("waiting for the robot: go to 99"));
     let refused = Answer::Outcome(Outcome::Refused(Refusal::UnknownVertex));
-    watch.model.hear(News::Answered(go.clone(), Ok(refused)), watch.now);
+    watch.model.apply(LinkEvent::TaskDone(go.clone(), Ok(refused)), watch.now);
     let screen = watch.screen(80, 24);
     assert!(screen.contains("go to 99: refused: the map has no such vertex"), "{screen}");
     assert!(!screen.contains("waiting"), "{screen}");
-    watch.model.hear(News::Answered(go, Err(TaskError::NotConnected)), watch.now);
+    watch.model.apply(LinkEvent::TaskDone(go, Err(TaskError::NotConnected)), watch.now);
     assert!(watch.screen(80, 24).contains("go to 99: the robot is not connected"));
-    let pause = Task::Tell(Command::Pause { on: true });
-    watch.model.hear(News::Answered(pause, Ok(Answer::Outcome(Outcome::Done))), watch.now);
+    let pause = Task::Command(Command::Pause { on: true });
+    watch.model.apply(LinkEvent::TaskDone(pause, Ok(Answer::Outcome(Outcome::Done))), watch.now);
     let screen = watch.screen(80, 24);
     assert!(screen.contains("pause: done") && screen.contains("paused"), "{screen}");
 }
@@ -287,9 +287,9 @@ fn the_standard_input_is_read_only() {
     let mut watch = Watch::new("-");
     for key in "iuepclmgsrtx".chars() {
         assert_eq!(watch.press(KeyCode::Char(key)), None);
-        assert!(watch.screen(80, 24).contains("nothing can be told on the standard input"), "{key}");
+        assert!(watch.screen(80, 24).contains("the standard input takes no commands"), "{key}");
     }
-    watch.model.hear(News::Ended, watch.now);
+    watch.model.apply(LinkEvent::Ended, watch.now);
     assert!(watch.screen(80, 24).contains("ended"));
     assert_eq!(watch.press(KeyCode::Char('q')), Some(Action::Quit));
 }
@@ -297,11 +297,11 @@ fn the_standard_input_is_read_only() {
 #[test]
 fn goals_and_remapped_vertices_are_shown() {
     let mut watch = Watch::new("tcp:robot:7070");
-    watch.hear(&Message::Vertex { vertex: 0, radius_mm: 700, visits: 1 });
-    watch.hear(&Message::Vertex { vertex: 1, radius_mm: 900, visits: 1 });
-    watch.hear(&Message::GoalStatus(GoalStatus { vertex: 1, state: GoalState::Active }));
+    watch.receive(&Message::Vertex { vertex: 0, radius_mm: 700, visits: 1 });
+    watch.receive(&Message::Vertex { vertex: 1, radius_mm: 900, visits: 1 });
+    watch.receive(&Message::GoalStatus(GoalStatus { vertex: 1, state: GoalState::Active }));
     assert!(watch.screen(120, 40).contains("goal vertex 1: active"));
-    watch.hear(&Message::Remapped(Remapped { place_index: 2, vertices: toposlam::wire::List::new([1, 0]) }));
+    watch.receive(&Message::Remapped(Remapped { place_index: 2, vertices: toposlam::wire::List::new([1, 0]) }));
     let screen = watch.screen(120, 40);
     assert!(screen.contains("0 is 1, 1 is 0") && screen.contains("goal vertex 0: active"), "{screen}");
 }
@@ -309,10 +309,10 @@ fn goals_and_remapped_vertices_are_shown() {
 #[test]
 fn a_restart_of_the_robot_is_reported_and_clears_the_map() {
     let mut watch = Watch::new("tcp:robot:7070");
-    watch.hear(&Message::Hello(hello()));
-    watch.hear(&Message::Edge { a: 0, b: 1, present: true });
+    watch.receive(&Message::Hello(hello()));
+    watch.receive(&Message::Edge { a: 0, b: 1, present: true });
     watch.encoder = Encoder::new(0);
-    watch.hear(&Message::Hello(Hello { boot: 4, ..hello() }));
+    watch.receive(&Message::Hello(Hello { boot: 4, ..hello() }));
     let screen = watch.screen(120, 40);
-    assert!(screen.contains("the robot has started anew") && screen.contains("no map yet"), "{screen}");
+    assert!(screen.contains("the robot has restarted") && screen.contains("no map yet"), "{screen}");
 }

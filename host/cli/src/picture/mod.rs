@@ -146,36 +146,33 @@ pub fn draw(plan: &Plan, truth: &TrueMap, drawing: &Drawing) -> String {
         .to_string()
 }
 
-/// The wall cells, with one rectangle per run of cells in a row.
+/// The walls: everything but free space.
 fn walls(plan: &Plan) -> Path {
-    let cell_mm = f64::from(plan.cell_mm());
-    let (columns, rows) = (plan.columns() as i32, plan.rows() as i32);
-    let mut data = Data::new();
-    for row in 0..rows {
-        let mut column = 0;
-        while column < columns {
-            let run = (column..columns).take_while(|column| plan.is_wall(*column, row)).count() as i32;
-            if run > 0 {
-                let (x, y) = (f64::from(column) * cell_mm, f64::from(rows - 1 - row) * cell_mm);
-                let run_mm = f64::from(run) * cell_mm;
-                data = data.move_to((x, y)).horizontal_line_by(run_mm).vertical_line_by(cell_mm);
-                data = data.horizontal_line_by(-run_mm).close();
-            }
-            column += run.max(1);
-        }
-    }
-    Path::new().set("d", data).set("fill", "#c9c9c9")
+    let (width_mm, height_mm) = (plan.width_mm(), plan.height_mm());
+    let data = Data::new().move_to((0, 0)).horizontal_line_to(width_mm).vertical_line_to(height_mm);
+    let data = plan.outlines().iter().fold(data.horizontal_line_to(0).close(), |data, ring| {
+        let corners = ring.iter().map(|corner| (corner.x_mm, height_mm - corner.y_mm));
+        let line = corners.enumerate().fold(
+            data,
+            |data, (index, corner)| {
+                if index == 0 { data.move_to(corner) } else { data.line_to(corner) }
+            },
+        );
+        line.close()
+    });
+    Path::new().set("d", data).set("fill", "#c9c9c9").set("fill-rule", "evenodd")
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
     use toposlam::{Fingerprint, place::Place};
+    use toposlam_sim::world::Limits;
 
     #[test]
     fn a_drawing_has_every_vertex_and_edge_and_escaped_text() {
         let plan = Plan::built_in("ring").unwrap();
-        let truth = TrueMap::of(&plan).unwrap();
+        let truth = plan.true_map(&Limits::default()).unwrap();
         let mut drawing = Drawing::of_truth(&truth, "a < b & c".to_owned());
         drawing.edges.push((0, 0));
         drawing.edges.push((0, 99));

@@ -36,7 +36,7 @@ use toposlam::wire::{Encoder, MAX_FRAME_BYTES, Message};
 pub use broker::{Broker, OptionError, Options};
 
 use toposlam_link::json;
-use toposlam_link::link::News;
+use toposlam_link::link::LinkEvent;
 use toposlam_link::listener::{Event, Listener};
 
 /// Maximum number of queued messages.
@@ -52,7 +52,7 @@ const MOST_BYTES: usize = 1 << 17;
 
 /// An event of the connection to the broker.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub enum BrokerNews {
+pub enum BrokerEvent {
     /// The broker has accepted the connection.
     Connected,
     /// The connection failed. The publisher retries; a repeated failure for the same reason is not reported.
@@ -106,8 +106,8 @@ const ONLINE: &str = "online";
 const OFFLINE: &str = "offline";
 
 impl Publisher {
-    /// Starts a thread that connects to the broker and reports through `tell`.
-    pub fn start(options: Options, tell: impl FnMut(BrokerNews) + Send + 'static) -> Self {
+    /// Starts a thread that connects to the broker and reports through `on_event`.
+    pub fn start(options: Options, on_event: impl FnMut(BrokerEvent) + Send + 'static) -> Self {
         let topic = |what| format!("toposlam/{}/{what}", options.robot);
         let topics =
             Topics { status: topic("status"), map: topic("map"), events: topic("events"), frames: topic("frames") };
@@ -135,7 +135,7 @@ impl Publisher {
         let (sender, ended) = channel();
         let far = (client.clone(), Arc::clone(&shared));
         thread::spawn(move || {
-            serve(connection, &far.0, &far.1, tell);
+            serve(connection, &far.0, &far.1, on_event);
             // The receiver may already be gone.
             let _ = sender.send(());
         });
@@ -143,12 +143,12 @@ impl Publisher {
     }
 
     /// Processes an event of the robot's link. Never blocks.
-    pub fn hear(&mut self, news: &News) {
+    pub fn apply(&mut self, event: &LinkEvent) {
         let mut retained = self.shared.retained();
-        match news {
-            News::Connected => retained.set_status(ONLINE),
-            News::Disconnected(_) | News::Ended => retained.set_status(OFFLINE),
-            News::Heard(event, listener) => {
+        match event {
+            LinkEvent::Connected => retained.set_status(ONLINE),
+            LinkEvent::Disconnected(_) | LinkEvent::Ended => retained.set_status(OFFLINE),
+            LinkEvent::Received(event, listener) => {
                 let event = Event::from(event);
                 if changes_map(event) && listener.replica().is_converged() {
                     retained.set_map(map_json(listener).to_string());
@@ -161,7 +161,7 @@ impl Publisher {
                     self.shared.offer(&self.client, &self.shared.topics.frames, frame);
                 }
             }
-            News::Answered(..) => {}
+            LinkEvent::TaskDone(..) => {}
         }
         self.shared.settle(&self.client, &mut retained);
     }
@@ -220,7 +220,7 @@ impl Shared {
         count.fetch_add(1, Ordering::Relaxed);
     }
 
-    /// Queues retained messages that the broker does not have yet. If the queue is full, the next news retries.
+    /// Queues retained messages that the broker does not have yet. If the queue is full, the next event retries.
     fn settle(&self, client: &Client, retained: &mut Retained) {
         if !self.is_connected() {
             return;
@@ -242,7 +242,7 @@ fn serve(
     mut connection: rumqttc::Connection,
     client: &Client,
     shared: &Shared,
-    mut tell: impl FnMut(BrokerNews) + Send,
+    mut on_event: impl FnMut(BrokerEvent) + Send,
 ) {
     let mut last_reason = String::new();
     for event in connection.iter() {
@@ -255,7 +255,7 @@ fn serve(
                 shared.settle(client, &mut retained);
                 drop(retained);
                 last_reason.clear();
-                tell(BrokerNews::Connected);
+                on_event(BrokerEvent::Connected);
             }
             Ok(_) => {}
             Err(error) => {
@@ -265,7 +265,7 @@ fn serve(
                 }
                 let reason = error.to_string();
                 if reason != last_reason {
-                    tell(BrokerNews::Disconnected(reason.clone()));
+                    on_event(BrokerEvent::Disconnected(reason.clone()));
                     last_reason = reason;
                 }
                 thread::sleep(RETRY);

@@ -36,7 +36,7 @@ use self::state::State;
 use toposlam_link::link::{Link, Options, Source};
 use toposlam_link::watch::Watch;
 
-/// Maximum number of queued news. When the queue is full, the link waits for this thread, which never waits for a
+/// Maximum number of queued events. When the queue is full, the link waits for this thread, which never waits for a
 /// browser.
 const QUEUE: usize = 256;
 
@@ -45,11 +45,11 @@ const QUEUE: usize = 256;
 /// `name` is the name of the line, `-` for the standard input; `baud` is the speed of a serial port.
 pub fn follow(name: &str, baud: u32, options: Options, server: &Server) {
     let (sender, inbox) = sync_channel(QUEUE);
-    let _link = Link::start(Source::named(name, baud), options, move |news| sender.send(news).is_ok());
+    let _link = Link::start(Source::named(name, baud), options, move |event| sender.send(event).is_ok());
     let mut watch = Watch::new(name);
     while let Ok(first) = inbox.recv() {
-        watch.hear(first);
-        inbox.try_iter().take(QUEUE).for_each(|news| watch.hear(news));
+        watch.apply(first);
+        inbox.try_iter().take(QUEUE).for_each(|event| watch.apply(event));
         server.publish(&State::of(&mut watch));
     }
 }

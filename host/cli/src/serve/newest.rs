@@ -52,9 +52,9 @@ impl Part {
     }
 
     fn unless_seen(&self, seen: &mut u64) -> Option<Arc<str>> {
-        let news = *seen != self.number;
+        let is_new = *seen != self.number;
         *seen = self.number;
-        news.then(|| Arc::clone(&self.text))
+        is_new.then(|| Arc::clone(&self.text))
     }
 }
 

@@ -2,10 +2,10 @@
 //!
 //! ```
 //! use toposlam_cli::serve::state::State;
-//! use toposlam_link::{link::News, watch::Watch};
+//! use toposlam_link::{link::LinkEvent, watch::Watch};
 //!
 //! let mut watch = Watch::new("tcp:robot:7070");
-//! watch.hear(News::Connected);
+//! watch.apply(LinkEvent::Connected);
 //! let state = State::of(&mut watch);
 //! assert_eq!(state.map["connection"]["state"], "open");
 //! assert_eq!((state.map["edges"].to_string(), state.live["line"]["lost"].as_u64()), ("[]".to_owned(), Some(0)));
@@ -132,7 +132,7 @@ fn connection(connection: &Connection) -> Value {
     match connection {
         Connection::Opening => json!({"state": "opening"}),
         Connection::Open => json!({"state": "open"}),
-        Connection::Cut(reason) => json!({"state": "cut", "reason": reason}),
+        Connection::Lost(reason) => json!({"state": "cut", "reason": reason}),
         Connection::Ended => json!({"state": "ended"}),
     }
 }

@@ -17,7 +17,7 @@ use toposlam::wire::{
 use super::server::{Options, Server};
 use super::state::State;
 use toposlam_link::broadcast::Broadcast;
-use toposlam_link::link::{self, News};
+use toposlam_link::link::{self, LinkEvent};
 use toposlam_link::listener::Listener;
 use toposlam_link::topology::TopologicalMap;
 use toposlam_link::watch::Watch;
@@ -267,12 +267,12 @@ fn excess_browsers_are_refused_and_dropping_the_server_ends_all_streams() {
     assert!(TcpStream::connect(address).is_err(), "the server no longer accepts connections");
 }
 
-fn hear(watch: &mut Watch, messages: &[Message]) {
+fn receive(watch: &mut Watch, messages: &[Message]) {
     let (mut listener, mut encoder) = (Listener::new(), Encoder::new(0));
     for message in messages {
         let mut frame = [0; MAX_FRAME_BYTES];
         listener.feed(encoder.encode(message, &mut frame).unwrap(), |listener, event| {
-            watch.hear(News::heard(listener, event));
+            watch.apply(LinkEvent::received(listener, event));
         });
         watch.arrange();
     }
@@ -285,7 +285,7 @@ fn another_version_is_distinguished_from_another_schema() {
     let hello = Hello::new(1, ResetCause::PowerOn, 1, capacities);
     let understanding = |hello| {
         let mut watch = Watch::new("line");
-        hear(&mut watch, &[Message::Hello(hello)]);
+        receive(&mut watch, &[Message::Hello(hello)]);
         State::of(&mut watch).map["understanding"].take()
     };
     assert_eq!(State::of(&mut Watch::new("line")).map["understanding"]["level"], "unknown");
@@ -301,7 +301,7 @@ fn a_ring_frame_changes_the_live_part_only() {
     let mut watch = Watch::new("line");
     let before = State::of(&mut watch);
     let echoes = Echoes::new(&[Echo::Range { range_mm: 1482 }, Echo::Silence, Echo::Dead]);
-    hear(&mut watch, &[Message::Ring { frame_index: 7, echoes }]);
+    receive(&mut watch, &[Message::Ring { frame_index: 7, echoes }]);
     let State { map, live } = State::of(&mut watch);
     assert_eq!(live["ring"], json!({"frame_index": 7, "ranges_mm": [1482, "silence", "dead"]}));
     assert_eq!((before.live["ring"].is_null(), map), (true, before.map));
@@ -317,10 +317,10 @@ fn a_renumbered_vertex_keeps_its_position() {
     };
     let path = [edge(0, 1), edge(1, 2), edge(2, 3)];
     let mut before = Watch::new("line");
-    hear(&mut before, &path);
+    receive(&mut before, &path);
     let mut after = Watch::new("line");
     let reversed = Message::Remapped(Remapped { place_index: 4, vertices: List::new([3, 2, 1, 0]) });
-    hear(&mut after, &[path.as_slice(), &[reversed]].concat());
+    receive(&mut after, &[path.as_slice(), &[reversed]].concat());
     let mut expected = positions(&mut before);
     expected.reverse();
     assert_eq!(positions(&mut after), expected);

@@ -156,7 +156,7 @@ fn keys_come_from_the_terminal_when_the_robot_is_the_standard_input() {
     terminal.wait_for("the input has ended");
     terminal.wait_for("at vertex");
     terminal.press("e");
-    terminal.wait_for("nothing can be told on the standard input");
+    terminal.wait_for("the standard input takes no commands");
     terminal.press("q");
     assert_eq!(terminal.end(), Some(0));
 }

@@ -89,7 +89,7 @@ impl Account {
 
 /// The results of a run.
 #[derive(Clone, Debug)]
-pub struct Life {
+pub struct SoakReport {
     /// Turns of the robot's main loop.
     pub turns: u64,
     /// Number of times that the watchdog was fed.
@@ -125,7 +125,7 @@ impl Soak {
     ///
     /// # Errors
     /// When the plan has no true map.
-    pub fn run(&self, plan: &Plan) -> Result<Life, VoronoiError> {
+    pub fn run(&self, plan: &Plan) -> Result<SoakReport, VoronoiError> {
         let mut buffer = [0; SNAPSHOT_BYTES];
         let mut exploration = Exploration::start(plan, self.model, self.seed, &mut buffer)?;
         let mut ring = RingInjector::new(self.rates, self.seed);
@@ -134,12 +134,12 @@ impl Soak {
         let mut auditor = Auditor::default();
         let mut out_of_order = 0;
         let mut kept = 0;
-        let mut heard: Decoder = Decoder::new();
+        let mut replies: Decoder = Decoder::new();
         for turn in 0..self.turns {
             let frame = exploration.frame();
             let frame = ring.disturb(frame, exploration.ring_faults());
-            let told = operator.turn(turn, exploration.robot().mapper().map().vertices().len() as u8);
-            let mut arriving = lines[0].carry(&told);
+            let request = operator.turn(turn, exploration.robot().mapper().map().vertices().len() as u8);
+            let mut arriving = lines[0].carry(&request);
             arriving.extend(lines[0].noise());
             auditor.arrive(&arriving);
             exploration.board().received.extend(arriving);
@@ -150,9 +150,9 @@ impl Soak {
             let sent = mem::take(&mut exploration.board().sent);
             auditor.depart(&sent, &operator, exploration.places() as u64);
             auditor.map(&frame);
-            each(&mut heard, &lines[1].carry(&sent), |message| {
+            each(&mut replies, &lines[1].carry(&sent), |message| {
                 if let Message::Reply(reply) = message {
-                    operator.hear(&reply, turn);
+                    operator.receive(&reply, turn);
                 }
             });
             kept += u64::from(!mem::take(&mut exploration.board().kept).is_empty());
@@ -171,7 +171,7 @@ impl Soak {
             history_full: (auditor.restored_at..places).filter(drops).count() as u64,
             ..auditor.account
         };
-        Ok(Life {
+        Ok(SoakReport {
             turns: self.turns,
             watchdog_fed: exploration.board().fed,
             places,
@@ -271,7 +271,7 @@ fn each<M: Payload>(decoder: &mut Decoder<M>, bytes: &[u8], mut take: impl FnMut
     }
 }
 
-impl Life {
+impl SoakReport {
     /// The violated expectations in words; empty when there are none.
     pub fn mistakes(&self) -> Vec<String> {
         let mut mistakes = Vec::new();

@@ -106,7 +106,7 @@ impl Operator {
     }
 
     /// Processes a reply.
-    pub(super) fn hear(&mut self, reply: &Reply, turn: u64) {
+    pub(super) fn receive(&mut self, reply: &Reply, turn: u64) {
         let Some(command) = self.awaits(reply.request) else { return };
         self.sent = None;
         self.counts.answered += 1;

@@ -60,7 +60,7 @@ fn the_layout_of_an_exploration_rarely_changes() {
         while exploration.places() < PLACES {
             exploration.advance();
             listener.feed(&exploration.board().sent, |listener, event| match event {
-                Event::Message(header, message @ Message::Remapped(_)) => layout.hear(header, message),
+                Event::Message(header, message @ Message::Remapped(_)) => layout.apply(header, message),
                 // At this message the update is complete.
                 Event::Message(_, Message::Map { .. }) => tally.arrange(&mut layout, listener),
                 Event::Message(..) | Event::Damaged(_) => {}

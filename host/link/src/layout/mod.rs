@@ -164,7 +164,7 @@ impl Layout {
 
     /// Applies a message that changes vertex numbers: renumbers the vertices, or clears the drawing after a restart of
     /// the robot.
-    pub fn hear(&mut self, header: Header, message: &Message) {
+    pub fn apply(&mut self, header: Header, message: &Message) {
         match header.arrival {
             Arrival::Late => return,
             Arrival::Restart => *self = Self::new(),

@@ -41,8 +41,8 @@ impl Robot {
             while !told_to_end.load(Ordering::Relaxed) {
                 exploration.advance();
                 let board = exploration.board();
-                let heard = broadcast.exchange(&board.sent);
-                board.received.extend(heard);
+                let received = broadcast.exchange(&board.sent);
+                board.received.extend(received);
                 thread::sleep(Duration::from_millis(1));
             }
         };
@@ -57,22 +57,22 @@ impl Drop for Robot {
     }
 }
 
-fn link_to(address: SocketAddr, options: Options) -> (Link, Receiver<News>) {
+fn link_to(address: SocketAddr, options: Options) -> (Link, Receiver<LinkEvent>) {
     let (sender, news) = mpsc::channel();
     let source = Source::named(&format!("tcp:{address}"), 115_200);
     (Link::start(source, options, move |news| sender.send(news).is_ok()), news)
 }
 
-fn wait_for<T>(news: &Receiver<News>, what: impl FnMut(News) -> Option<T>) -> T {
+fn wait_for<T>(news: &Receiver<LinkEvent>, what: impl FnMut(LinkEvent) -> Option<T>) -> T {
     news.iter().find_map(what).expect("the link is running")
 }
 
-fn disconnected(news: News) -> Option<String> {
-    if let News::Disconnected(reason) = news { Some(reason) } else { None }
+fn disconnected(news: LinkEvent) -> Option<String> {
+    if let LinkEvent::Disconnected(reason) = news { Some(reason) } else { None }
 }
 
-fn connected(news: News) -> Option<()> {
-    matches!(news, News::Connected).then_some(())
+fn connected(news: LinkEvent) -> Option<()> {
+    matches!(news, LinkEvent::Connected).then_some(())
 }
 
 #[test]
@@ -83,7 +83,7 @@ fn a_cut_line_is_reopened_and_the_state_is_kept() {
     wait_for(&news, connected);
     let edges = |at_least: usize| {
         move |news| {
-            let News::Heard(_, listener) = news else { return None };
+            let LinkEvent::Received(_, listener) = news else { return None };
             (listener.map().edges.len() >= at_least).then(|| listener.counters().messages)
         }
     };
@@ -92,7 +92,7 @@ fn a_cut_line_is_reopened_and_the_state_is_kept() {
     wait_for(&news, disconnected);
     let robot = Robot::at(&address.to_string());
     wait_for(&news, connected);
-    let after = wait_for(&news, |news| if let News::Heard(_, listener) = news { Some(listener) } else { None });
+    let after = wait_for(&news, |news| if let LinkEvent::Received(_, listener) = news { Some(listener) } else { None });
     assert!(after.counters().messages > messages, "the count continues");
     wait_for(&news, edges(2));
     drop(robot);
@@ -107,15 +107,15 @@ fn a_missing_robot_is_reported_once_and_retried_and_tasks_fail() {
     let reason = wait_for(&news, disconnected);
     assert!(reason.contains(&address.to_string()), "{reason}");
     for _ in 0..3 {
-        link.start_task(Task::Tell(Command::Explore));
+        link.start_task(Task::Command(Command::Explore));
         match news.recv().unwrap() {
-            News::Answered(Task::Tell(Command::Explore), Err(TaskError::NotConnected)) => {}
+            LinkEvent::TaskDone(Task::Command(Command::Explore), Err(TaskError::NotConnected)) => {}
             other => panic!("{other:?}"),
         }
         thread::sleep(2 * OPTIONS.retry);
     }
     let _robot = Robot::at(&address.to_string());
-    assert!(matches!(news.recv().unwrap(), News::Connected), "the reason is not repeated");
+    assert!(matches!(news.recv().unwrap(), LinkEvent::Connected), "the reason is not repeated");
 }
 
 #[test]
@@ -125,13 +125,13 @@ fn tasks_are_executed_and_refusals_are_returned() {
     wait_for(&news, connected);
     let perform = |task: Task| {
         link.start_task(task);
-        wait_for(&news, |news| if let News::Answered(task, answer) = news { Some((task, answer)) } else { None })
+        wait_for(&news, |news| if let LinkEvent::TaskDone(task, answer) = news { Some((task, answer)) } else { None })
     };
-    let set = Task::Tell(Command::SetConfig(Setting::NoiseMm(0)));
+    let set = Task::Command(Command::SetConfig(Setting::NoiseMm(0)));
     let (task, answer) = perform(set.clone());
     assert_eq!(task, set);
     assert_eq!(answer.unwrap(), Answer::Outcome(Outcome::Refused(Refusal::OutOfRange)));
-    let (_, answer) = perform(Task::Tell(Command::Pause { on: true }));
+    let (_, answer) = perform(Task::Command(Command::Pause { on: true }));
     assert_eq!(answer.unwrap(), Answer::Outcome(Outcome::Done));
 
     let directory = tempfile::tempdir().unwrap();
@@ -153,7 +153,7 @@ fn a_silent_connection_is_reopened() {
     let (_link, news) = link_to(silent.address().unwrap(), options);
     wait_for(&news, connected);
     let reason = wait_for(&news, disconnected);
-    assert!(reason.contains("nothing was heard"), "{reason}");
+    assert!(reason.contains("no data for"), "{reason}");
     wait_for(&news, connected);
     silent.exchange(&[]);
 }
@@ -170,5 +170,5 @@ fn dropping_a_link_closes_its_line() {
     while robot.listeners() > 0 {
         robot.exchange(b"anyone?");
     }
-    assert!(news.iter().all(|news| matches!(news, News::Heard(Err(_), _))), "no other news after the drop");
+    assert!(news.iter().all(|news| matches!(news, LinkEvent::Received(Err(_), _))), "no other news after the drop");
 }

@@ -12,7 +12,7 @@
 //!
 //! let mut file = Vec::new();
 //! let mut recorder = Recorder::new(&mut file)?;
-//! recorder.hear(edge, 1_000_000_000)?;
+//! recorder.record(edge, 1_000_000_000)?;
 //! recorder.finish()?;
 //!
 //! let mut listener = Listener::new();

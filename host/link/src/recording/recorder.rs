@@ -83,7 +83,7 @@ impl<FILE: Write> Recorder<FILE> {
     ///
     /// # Errors
     /// If the file cannot be written. It then ends with the last complete chunk.
-    pub fn hear(&mut self, bytes: &[u8], time_ns: u64) -> Result<(), RecordingError> {
+    pub fn record(&mut self, bytes: &[u8], time_ns: u64) -> Result<(), RecordingError> {
         self.newest_ns = time_ns;
         for &byte in bytes {
             self.piece.push(byte);
@@ -166,7 +166,7 @@ impl<FILE: Write> Notes<FILE> {
         if header.arrival == Arrival::Restart {
             self.faults = [0; FAULT_KINDS];
         }
-        self.layout.hear(header, message);
+        self.layout.apply(header, message);
         if let Message::Fault { kind, count } = message { self.fault(*kind, *count, time_ns) } else { Ok(()) }
     }
 

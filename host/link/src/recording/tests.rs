@@ -46,14 +46,14 @@ fn recorded(turns: &[Vec<u8>]) -> Vec<u8> {
     let mut file = Vec::new();
     let mut recorder = Recorder::new(&mut file).unwrap();
     for (bytes, turn) in turns.iter().zip(0..) {
-        recorder.hear(bytes, SECOND_NS + turn * SECOND_NS / 10).unwrap();
+        recorder.record(bytes, SECOND_NS + turn * SECOND_NS / 10).unwrap();
     }
     recorder.finish().unwrap();
     file
 }
 
 /// The state of a listener after each event.
-fn heard<'bytes>(pieces: impl Iterator<Item = &'bytes [u8]>) -> Vec<String> {
+fn events_of<'bytes>(pieces: impl Iterator<Item = &'bytes [u8]>) -> Vec<String> {
     let mut listener = Listener::new();
     let mut states = Vec::new();
     for piece in pieces {
@@ -81,14 +81,14 @@ fn encoded(messages: &[Message]) -> Vec<u8> {
 fn a_recording_reproduces_the_live_state_after_each_message() {
     let drive = &DRIVE;
     let frames = read(&recorded(&drive.turns));
-    let live = heard(drive.turns.iter().map(Vec::as_slice));
-    assert_eq!(heard(frames.iter().map(|frame| &frame.bytes[..])), live);
+    let live = events_of(drive.turns.iter().map(Vec::as_slice));
+    assert_eq!(events_of(frames.iter().map(|frame| &frame.bytes[..])), live);
     let mut listener = Listener::new();
     let mut digest = None;
     for frame in &frames {
         listener.feed(&frame.bytes, |_, event| {
-            if let Event::Message(_, Message::Map { digest: told, .. }) = event {
-                digest = Some(*told);
+            if let Event::Message(_, Message::Map { digest: sent, .. }) = event {
+                digest = Some(*sent);
             }
         });
     }
@@ -112,7 +112,7 @@ fn damaged_bytes_are_recorded_unchanged_with_the_end_time_of_their_frame() {
     let frames = read(&recorded(&turns));
     let all: Vec<u8> = frames.iter().flat_map(|frame| frame.bytes.clone()).collect();
     assert!(all == turns.concat());
-    assert_eq!(heard(frames.iter().map(|frame| &frame.bytes[..])), heard(std::iter::once(&all[..])));
+    assert_eq!(events_of(frames.iter().map(|frame| &frame.bytes[..])), events_of(std::iter::once(&all[..])));
     let mut came = turns.iter().zip(0..).flat_map(|(bytes, turn)| bytes.iter().map(move |_| turn));
     for frame in &frames {
         let turn: u64 = came.nth(frame.bytes.len() - 1).unwrap();
@@ -159,7 +159,7 @@ fn a_killed_recording_loses_at_most_five_seconds() {
     let mut file = Vec::new();
     let mut recorder = Recorder::new(Lost(&mut file)).unwrap();
     for (bytes, turn) in turns.iter().zip(0..) {
-        recorder.hear(bytes, turn * SECOND_NS / 10).unwrap();
+        recorder.record(bytes, turn * SECOND_NS / 10).unwrap();
     }
     std::mem::forget(recorder);
     let mut recording = Recording::new(&file[..]);
@@ -207,8 +207,8 @@ fn viewer_topics_get_ring_frames_new_faults_and_map_changes() {
     let mut recorder = Recorder::new(&mut file).unwrap();
     let mut bytes = encoded(&messages);
     bytes[2] ^= 2;
-    recorder.hear(&bytes, 3 * SECOND_NS).unwrap();
-    recorder.hear(&[], 4 * SECOND_NS).unwrap();
+    recorder.record(&bytes, 3 * SECOND_NS).unwrap();
+    recorder.record(&[], 4 * SECOND_NS).unwrap();
     assert_eq!(recorder.finish().unwrap().frames, 5);
 
     let logs: Vec<String> = on(&file, Topic::Log).iter().map(|data| Log::decode(&data[..]).unwrap().message).collect();

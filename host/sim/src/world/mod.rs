@@ -20,21 +20,28 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
+mod branches;
+mod graph;
+mod grid;
 mod ground_truth;
 mod hints;
+mod obstacles;
 mod plan;
 mod ray_casting;
 mod rover;
 mod simulation;
+mod truth;
 mod voronoi;
+mod walls;
 
 pub use ground_truth::{Detection, GroundTruth, Report};
 pub use hints::{HintReport, ReportedHints};
-pub use plan::{Plan, PlanError};
+pub use plan::{Plan, PlanError, PlanFileError};
 pub use ray_casting::{SONARS, SonarModel};
 pub use rover::{BodyModel, Rover};
 pub use simulation::{Pose, RobotModel, Simulation, Truth};
-pub use voronoi::{TrueEdge, TrueMap, TrueNode, TrueWay, VoronoiError};
+pub use truth::{Dropped, Limits, TrueEdge, TrueMap, TrueNode, TrueWay, UnreachablePart};
+pub use voronoi::VoronoiError;
 
 /// A point of the floor plan, in millimetres from its lower left corner; x to the right, y up.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]

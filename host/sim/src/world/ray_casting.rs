@@ -6,8 +6,8 @@ use rand::{Rng, RngExt};
 use rand_distr::{Distribution, StandardNormal};
 use toposlam::ring::{Echo, RingFrame};
 
+use super::Pose;
 use super::plan::Plan;
-use super::{Point, Pose};
 
 /// Number of sonars of the simulated ring of the reference robot: evenly spaced and counter-clockwise, the first straight ahead.
 pub const SONARS: usize = 16;
@@ -55,15 +55,14 @@ pub(super) fn wrapped(angle_rad: f64) -> f64 {
     (angle_rad + PI).rem_euclid(TAU) - PI
 }
 
-/// A floor plan prepared for ray casting.
+/// What the ring hears of a floor plan.
 pub(super) struct Scene {
     plan: Plan,
-    corners: Vec<Point>,
 }
 
 impl Scene {
     pub(super) fn new(plan: &Plan) -> Self {
-        Self { plan: plan.clone(), corners: plan.corners() }
+        Self { plan: plan.clone() }
     }
 
     /// Simulates one reading of a ring. `SONARS` divides the number of rays.
@@ -96,10 +95,11 @@ impl Scene {
     /// Range of the nearest wall that each sonar measures, in millimetres; infinite without an echo.
     fn walls<const SONARS: usize>(&self, pose: &Pose, model: &SonarModel) -> [f64; SONARS] {
         let spacing = TAU / RAYS as f64;
+        let least_cosine = model.specular_limit_rad.cos();
         let rays: [f64; RAYS] = std::array::from_fn(|ray| {
             let direction = pose.heading_rad + ray as f64 * spacing;
-            let (hit_mm, off_normal_rad) = self.cast(pose.position, direction, model.range_max_mm);
-            if off_normal_rad <= model.specular_limit_rad { hit_mm } else { f64::INFINITY }
+            let hit = self.plan.walls().cast(pose.position, direction, model.range_max_mm);
+            if hit.cosine_off_normal >= least_cosine { hit.range_mm } else { f64::INFINITY }
         });
         let half = ((model.cone_half_angle_rad / spacing) as usize).min(RAYS / 2);
         std::array::from_fn(|sonar| {
@@ -110,59 +110,21 @@ impl Scene {
 
     /// Adds the echoes of the visible corners in each cone.
     fn hear_corners<const SONARS: usize>(&self, pose: &Pose, model: &SonarModel, heard_mm: &mut [f64; SONARS]) {
-        for corner in &self.corners {
-            let range_mm = pose.position.distance_mm(*corner);
+        for corner in self.plan.walls().corners_near(pose.position, model.range_max_mm) {
+            let range_mm = pose.position.distance_mm(corner);
             if range_mm > model.range_max_mm {
                 continue;
             }
-            let direction = pose.position.direction_to(*corner);
+            let direction = pose.position.direction_to(corner);
             let mut in_sight = None;
             for (sonar, heard_mm) in heard_mm.iter_mut().enumerate() {
                 let axis = pose.heading_rad + TAU * sonar as f64 / SONARS as f64;
                 if range_mm < *heard_mm && wrapped(direction - axis).abs() <= model.cone_half_angle_rad {
-                    let seen = *in_sight
-                        .get_or_insert_with(|| self.cast(pose.position, direction, range_mm).0 >= range_mm - 1.0);
-                    if seen {
+                    let in_sight = in_sight.get_or_insert_with(|| self.plan.walls().is_in_sight(pose.position, corner));
+                    if *in_sight {
                         *heard_mm = range_mm;
                     }
                 }
-            }
-        }
-    }
-
-    /// Casts a ray to the first wall: the distance in millimetres (infinite beyond the limit), and the angle of
-    /// incidence.
-    fn cast(&self, from: Point, direction: f64, limit_mm: f64) -> (f64, f64) {
-        let cell_mm = f64::from(self.plan.cell_mm());
-        let (sine, cosine) = direction.sin_cos();
-        let (mut column, mut row) = ((from.x_mm / cell_mm).floor() as i32, (from.y_mm / cell_mm).floor() as i32);
-        // For each axis: the step in cells, the distance between two grid lines, the distance to the first one.
-        let axis = |cell: i32, start_mm: f64, slope: f64| {
-            let line = if slope > 0.0 { cell + 1 } else { cell };
-            let to_line = (f64::from(line) * cell_mm - start_mm) / slope;
-            (
-                if slope > 0.0 { 1 } else { -1 },
-                (cell_mm / slope).abs(),
-                if slope == 0.0 { f64::INFINITY } else { to_line },
-            )
-        };
-        let (step_x, between_x, mut to_x) = axis(column, from.x_mm, cosine);
-        let (step_y, between_y, mut to_y) = axis(row, from.y_mm, sine);
-        loop {
-            let (way_mm, into) = if to_x < to_y {
-                column += step_x;
-                to_x += between_x;
-                (to_x - between_x, cosine.abs())
-            } else {
-                row += step_y;
-                to_y += between_y;
-                (to_y - between_y, sine.abs())
-            };
-            if way_mm > limit_mm {
-                return (f64::INFINITY, 0.0);
-            }
-            if self.plan.is_wall(column, row) {
-                return (way_mm, into.min(1.0).acos());
             }
         }
     }
@@ -171,6 +133,7 @@ impl Scene {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::world::Point;
     use rand::SeedableRng;
     use rand_xoshiro::Xoshiro256PlusPlus;
 
@@ -182,9 +145,9 @@ mod tests {
 
     #[test]
     fn a_ray_ends_at_the_first_wall() {
-        let (range_mm, off_normal_rad) = closet().cast(Point::new(1000.0, 600.0), 0.3, 6000.0);
-        assert!((range_mm - 3000.0 / 0.3f64.cos()).abs() < 1e-6);
-        assert!((off_normal_rad - 0.3).abs() < 1e-9);
+        let hit = closet().plan.walls().cast(Point::new(1000.0, 600.0), 0.3, 6000.0);
+        assert!((hit.range_mm - 3000.0 / 0.3f64.cos()).abs() < 1e-6);
+        assert!((hit.cosine_off_normal - 0.3f64.cos()).abs() < 1e-9);
     }
 
     #[test]

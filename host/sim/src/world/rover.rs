@@ -1,5 +1,7 @@
 //! A differential-drive robot that follows velocity commands, with a body that walls stop and a ring of sonars.
 
+use std::sync::Arc;
+
 use rand::SeedableRng;
 use rand_distr::{Distribution, StandardNormal};
 use rand_xoshiro::Xoshiro256PlusPlus;
@@ -7,7 +9,7 @@ use toposlam::drive::{VelocityCommand, WheelSpeeds, WheelsConfig};
 use toposlam::ring::RingFrame;
 
 use super::ray_casting::{Scene, wrapped};
-use super::{Plan, Point, Pose, RobotModel, TrueMap, Truth, VoronoiError};
+use super::{Limits, Plan, Point, Pose, RobotModel, TrueMap, Truth, VoronoiError};
 
 /// Distance within which the robot is at a true node, in millimetres.
 const AT_NODE_MM: f64 = 200.0;
@@ -39,7 +41,7 @@ impl Default for BodyModel {
 pub struct Rover {
     scene: Scene,
     plan: Plan,
-    map: TrueMap,
+    map: Arc<TrueMap>,
     model: RobotModel,
     body: BodyModel,
     random: Xoshiro256PlusPlus,
@@ -55,7 +57,7 @@ impl Rover {
     /// # Errors
     /// When the plan has no true map.
     pub fn new(plan: &Plan, model: RobotModel, body: BodyModel, seed: u64) -> Result<Self, VoronoiError> {
-        let map = TrueMap::of(plan)?;
+        let map = plan.true_map(&Limits::of(&body, &model.sonar))?;
         let mut random = Xoshiro256PlusPlus::seed_from_u64(seed);
         let anywhere: f64 = StandardNormal.sample(&mut random);
         Ok(Self {
@@ -73,7 +75,7 @@ impl Rover {
     }
 
     /// The true map of the building.
-    pub const fn true_map(&self) -> &TrueMap {
+    pub fn true_map(&self) -> &TrueMap {
         &self.map
     }
 
@@ -120,7 +122,7 @@ impl Rover {
             let (sine, cosine) = heading_rad.sin_cos();
             let Point { x_mm, y_mm } = self.pose.position;
             let position = Point::new(x_mm + cosine * way_mm, y_mm + sine * way_mm);
-            if self.fits(position) {
+            if self.plan.fits(position, self.body.radius_mm) {
                 self.pose.position = position;
             } else {
                 bumped = true;
@@ -133,15 +135,5 @@ impl Rover {
     /// Moves the robot to another pose without driving, as in the kidnapped-robot problem.
     pub fn carry_to(&mut self, pose: Pose) {
         self.pose = pose;
-    }
-
-    /// Whether the body fits at a position.
-    fn fits(&self, position: Point) -> bool {
-        (0..16).all(|direction| {
-            let (sine, cosine) = (f64::from(direction) * std::f64::consts::TAU / 16.0).sin_cos();
-            let edge =
-                Point::new(position.x_mm + cosine * self.body.radius_mm, position.y_mm + sine * self.body.radius_mm);
-            !self.plan.is_wall_at(edge)
-        })
     }
 }

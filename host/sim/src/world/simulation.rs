@@ -1,6 +1,7 @@
 //! A robot that drives along the true Voronoi graph at random and reads its sonars at every step.
 
 use std::f64::consts::PI;
+use std::sync::Arc;
 
 use rand::{RngExt, SeedableRng};
 use rand_distr::{Distribution, StandardNormal};
@@ -9,7 +10,7 @@ use toposlam::ring::RingFrame;
 use toposlam::{Exit, Passage};
 
 use super::ray_casting::{SONARS, Scene, SonarModel, wrapped};
-use super::{Plan, Point, TrueEdge, TrueMap, VoronoiError};
+use super::{BodyModel, Limits, Plan, Point, TrueEdge, TrueMap, VoronoiError};
 
 /// Position and heading of the robot.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -121,7 +122,7 @@ impl Drift {
 /// The same plan, model and seed give the same drive.
 pub struct Simulation {
     scene: Scene,
-    map: TrueMap,
+    map: Arc<TrueMap>,
     model: RobotModel,
     random: Xoshiro256PlusPlus,
     frame_index: u32,
@@ -147,7 +148,7 @@ impl Simulation {
     /// # Errors
     /// When the plan has no true map.
     pub fn new(plan: &Plan, model: RobotModel, seed: u64) -> Result<Self, VoronoiError> {
-        let map = TrueMap::of(plan)?;
+        let map = plan.true_map(&Limits::of(&BodyModel::default(), &model.sonar))?;
         let legs = map.edges.iter().enumerate().flat_map(|(edge, true_edge)| {
             true_edge.way.windows(2).enumerate().map(move |(leg, ends)| (edge, leg, along(ends, plan.start())))
         });
@@ -180,7 +181,7 @@ impl Simulation {
     }
 
     /// The true map of the building.
-    pub const fn true_map(&self) -> &TrueMap {
+    pub fn true_map(&self) -> &TrueMap {
         &self.map
     }
 

@@ -1,88 +1,19 @@
-//! The true map of a floor plan: its generalised Voronoi graph.
+//! The generalised Voronoi graph of a floor plan: the points that are as far from two walls.
 //!
-//! The exact Voronoi diagram of the wall surfaces (crate `boostvoronoi`) is reduced to what a robot can drive. Edges
-//! inside walls are removed, and so are edges that end in a concave corner, where no robot fits. A remaining point
-//! where three or more obstacles were equidistant is a node, even when only one or two edges remain (the end of a
-//! corridor, a bend).
+//! The exact Voronoi diagram of the wall surfaces (crate `boostvoronoi`) without the edges inside walls.
 
+use std::collections::HashMap;
 use std::fmt;
 
-use boostvoronoi::prelude::{Builder, BvError, Diagram, EdgeIndex, SourceCategory};
+use boostvoronoi::prelude::{Builder, BvError, Cell, Diagram, SourceCategory};
 
-use super::plan::Face;
+use super::walls::{Segment, Walls, point};
 use super::{Plan, Point};
 
-/// Points of the diagram this close are merged, in millimetres.
-const SAME_MM: f64 = 1.0;
-/// Curved edges are split into segments no longer than this, in millimetres.
+/// Points of the diagram this close are one, in millimetres.
+pub(super) const SAME_MM: f64 = 1.0;
+/// Curved edges are cut into pieces no longer than this, in millimetres.
 const PIECE_MM: f64 = 25.0;
-
-/// A place of the true map: a meet point of the generalised Voronoi graph.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct TrueNode {
-    /// Position of the node.
-    pub position: Point,
-    /// Distance to the closest obstacles, in millimetres.
-    pub radius_mm: f64,
-    /// Number of drivable edges that end here.
-    pub degree: usize,
-}
-
-/// A drivable connection between two nodes.
-#[derive(Clone, Debug, PartialEq)]
-pub struct TrueEdge {
-    /// The nodes at its ends.
-    pub nodes: [usize; 2],
-    /// Polyline from the first node to the second.
-    pub way: Vec<Point>,
-}
-
-/// One end of an edge at one of its nodes.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct TrueWay {
-    /// The edge.
-    pub edge: usize,
-    /// Whether the node is the second of the edge.
-    pub is_reversed: bool,
-    /// Direction of the point where the edge leaves the disc of the node, counter-clockwise from the x axis, in radians.
-    pub bearing_rad: f64,
-}
-
-impl TrueWay {
-    /// The edge and the end, for comparison.
-    pub const fn dart(&self) -> (usize, bool) {
-        (self.edge, self.is_reversed)
-    }
-}
-
-impl TrueEdge {
-    /// Length of the polyline, in millimetres.
-    pub fn length_mm(&self) -> f64 {
-        self.way.windows(2).map(|ends| ends[0].distance_mm(ends[1])).sum()
-    }
-
-    /// The point at this fraction of the polyline.
-    pub fn point_at(&self, share: f64) -> Point {
-        let mut left_mm = share * self.length_mm();
-        for ends in self.way.windows(2) {
-            let leg_mm = ends[0].distance_mm(ends[1]);
-            if left_mm <= leg_mm {
-                return ends[0].towards(ends[1], if leg_mm > 0.0 { left_mm / leg_mm } else { 0.0 });
-            }
-            left_mm -= leg_mm;
-        }
-        self.way.last().copied().unwrap_or_default()
-    }
-}
-
-/// The true places of a floor plan and their connections, as far as they are reachable from the start.
-#[derive(Clone, Debug, PartialEq)]
-pub struct TrueMap {
-    /// The places.
-    pub nodes: Vec<TrueNode>,
-    /// The connections.
-    pub edges: Vec<TrueEdge>,
-}
 
 /// Why a floor plan has no true map.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -111,87 +42,57 @@ impl From<BvError> for VoronoiError {
     }
 }
 
-/// A segment of the diagram between two of its points.
-struct Piece {
-    ends: [usize; 2],
-    way: Vec<Point>,
+/// A piece of the graph between two of its points.
+pub(super) struct Piece {
+    pub(super) ends: [usize; 2],
+    pub(super) way: Vec<Point>,
+    /// The smallest distance to a wall along it, in millimetres.
+    pub(super) clearance_mm: f64,
 }
 
-/// The points of the diagram and the segments between them, in free space.
-#[derive(Default)]
-struct Skeleton {
-    points: Vec<Point>,
-    pieces: Vec<Piece>,
+/// The graph's points and the pieces between them.
+pub(super) struct Skeleton {
+    pub(super) points: Vec<Point>,
+    pub(super) pieces: Vec<Piece>,
+    /// The pieces at each point, in ascending order.
+    at: Vec<Vec<usize>>,
+    alive: Vec<bool>,
+    degrees: Vec<usize>,
 }
 
-impl TrueMap {
-    /// Computes the true map of a plan.
-    ///
-    /// # Errors
-    /// When the diagram cannot be computed, or no meet point is reachable from the start.
-    pub fn of(plan: &Plan) -> Result<Self, VoronoiError> {
-        let faces = plan.faces();
-        let mut skeleton = Skeleton::of(plan, &faces)?;
-        let equidistant = skeleton.degrees();
-        let radius_mm = |point: Point| faces.iter().map(|face| face.distance_mm(point)).fold(f64::MAX, f64::min);
-        let in_corner: Vec<bool> = skeleton.points.iter().map(|point| radius_mm(*point) < SAME_MM).collect();
-        skeleton.pieces.retain(|piece| piece.ends.iter().all(|end| !in_corner[*end]));
-        skeleton.prune(&equidistant);
-        skeleton.keep_reachable(plan.start());
-        let drivable = skeleton.degrees();
-        let mut node_of = vec![None; skeleton.points.len()];
-        let mut nodes = Vec::new();
-        for (index, position) in skeleton.points.iter().copied().enumerate() {
-            if drivable[index] > 0 && equidistant[index] > 2 {
-                node_of[index] = Some(nodes.len());
-                nodes.push(TrueNode { position, radius_mm: radius_mm(position), degree: drivable[index] });
-            }
+/// What a cell of the diagram belongs to.
+#[derive(Clone, Copy)]
+enum Site {
+    Corner(Point),
+    Surface(Segment),
+}
+
+impl Site {
+    fn of(cell: &Cell, segments: &[Segment]) -> Self {
+        let segment = segments[cell.source_index().usize()];
+        match cell.source_category() {
+            _ if !cell.contains_point() => Self::Surface(segment),
+            SourceCategory::SegmentEnd => Self::Corner(point(segment.to)),
+            _ => Self::Corner(point(segment.from)),
         }
-        if nodes.is_empty() {
-            return Err(VoronoiError::NoPlace);
-        }
-        Ok(Self { edges: skeleton.chains(&node_of), nodes })
     }
 
-    /// The ways of a node, counter-clockwise by their bearing from its position. A loop is two of them.
-    pub fn ways(&self, node: usize) -> Vec<TrueWay> {
-        let mut ways = Vec::new();
-        for (edge, true_edge) in self.edges.iter().enumerate() {
-            for is_reversed in [false, true] {
-                if true_edge.nodes[usize::from(is_reversed)] == node {
-                    ways.push(self.way(edge, is_reversed));
-                }
-            }
+    fn distance_mm(self, to: Point) -> f64 {
+        match self {
+            Self::Corner(corner) => corner.distance_mm(to),
+            Self::Surface(segment) => segment.distance_mm(to),
         }
-        ways.sort_by(|one, other| one.bearing_rad.total_cmp(&other.bearing_rad));
-        ways
-    }
-
-    /// One end of an edge: the first node is that of the way, or the second if it is reversed.
-    pub fn way(&self, edge: usize, is_reversed: bool) -> TrueWay {
-        let TrueEdge { nodes, way } = &self.edges[edge];
-        let node = &self.nodes[nodes[usize::from(is_reversed)]];
-        let mut points: Vec<Point> = way.clone();
-        if is_reversed {
-            points.reverse();
-        }
-        let is_outside = |point: &&Point| node.position.distance_mm(**point) >= node.radius_mm;
-        let aim = points.iter().find(is_outside).or(points.last()).copied().unwrap_or_default();
-        TrueWay { edge, is_reversed, bearing_rad: node.position.direction_to(aim) }
-    }
-
-    /// The node nearest to a point, and its distance in millimetres.
-    pub fn nearest_node(&self, point: Point) -> Option<(usize, f64)> {
-        let distances = self.nodes.iter().map(|node| node.position.distance_mm(point)).enumerate();
-        distances.min_by(|one, other| one.1.total_cmp(&other.1))
     }
 }
 
 impl Skeleton {
-    fn of(plan: &Plan, faces: &[Face]) -> Result<Self, VoronoiError> {
-        let segments = faces.iter().map(|face| [face.from.0, face.from.1, face.to.0, face.to.1]);
-        let diagram = Builder::<i32>::default().with_segments(segments)?.build()?;
-        let mut skeleton = Self::default();
+    /// The graph in the free space of a plan. Time O(n log n) for n surfaces.
+    pub(super) fn of(plan: &Plan) -> Result<Self, VoronoiError> {
+        let segments = plan.walls().segments();
+        let corners = segments.iter().map(|segment| [segment.from.0, segment.from.1, segment.to.0, segment.to.1]);
+        let diagram = Builder::<i32>::default().with_segments(corners)?.build()?;
+        let mut points = Points::default();
+        let mut pieces = Vec::new();
         for edge in diagram.edges() {
             let twin = edge.twin()?;
             if edge.is_secondary() || twin.usize() < edge.id().usize() {
@@ -200,181 +101,184 @@ impl Skeleton {
             let (Some(from), Some(to)) = (edge.vertex0(), diagram.edge_get_vertex1(edge.id())?) else { continue };
             let (from, to) = (diagram.vertex(from)?, diagram.vertex(to)?);
             let (from, to) = (Point::new(from.x(), from.y()), Point::new(to.x(), to.y()));
-            let way = match edge.is_curved() {
-                true => curve(&diagram, faces, edge.id(), twin, from, to)?,
-                false => vec![from, to],
-            };
+            let site =
+                |edge| Ok::<_, BvError>(Site::of(diagram.cell(Diagram::edge_get_cell(&diagram, edge)?)?, segments));
+            let sites = [site(edge.id())?, site(twin)?];
+            let way = if edge.is_curved() { curve(sites, from, to) } else { vec![from, to] };
             let middle = way.len() / 2;
-            if from.distance_mm(to) < SAME_MM || plan.is_wall_at(way[middle - 1].towards(way[middle], 0.5)) {
+            if !plan.walls().is_free(way[middle - 1].towards(way[middle], 0.5)) {
                 continue;
             }
-            let ends = [skeleton.point(from), skeleton.point(to)];
-            skeleton.pieces.push(Piece { ends, way });
+            let ends = [points.index(from), points.index(to)];
+            if ends[0] == ends[1] && from.distance_mm(to) < SAME_MM {
+                continue;
+            }
+            pieces.push(Piece { ends, clearance_mm: clearance_mm(sites, &way), way });
+        }
+        let points = points.points;
+        let mut at = vec![Vec::new(); points.len()];
+        for (index, piece) in pieces.iter().enumerate() {
+            at[piece.ends[0]].push(index);
+            if piece.ends[1] != piece.ends[0] {
+                at[piece.ends[1]].push(index);
+            }
+        }
+        let alive = vec![true; pieces.len()];
+        let mut skeleton = Self { degrees: vec![0; points.len()], points, pieces, at, alive };
+        for piece in &skeleton.pieces {
+            piece.ends.iter().for_each(|end| skeleton.degrees[*end] += 1);
         }
         Ok(skeleton)
     }
 
-    /// Index of a point, which is inserted when it is new.
-    fn point(&mut self, point: Point) -> usize {
-        let known = self.points.iter().position(|known| known.distance_mm(point) < SAME_MM);
-        known.unwrap_or_else(|| {
-            self.points.push(point);
-            self.points.len() - 1
+    /// How many pieces end at each point.
+    pub(super) fn degrees(&self) -> &[usize] {
+        &self.degrees
+    }
+
+    /// The pieces that are left.
+    pub(super) fn alive(&self) -> impl Iterator<Item = &Piece> {
+        self.pieces.iter().zip(&self.alive).filter(|(_, alive)| **alive).map(|(piece, _)| piece)
+    }
+
+    /// The pieces that are left at a point: their numbers, and the points at their other ends.
+    pub(super) fn leaving(&self, from: usize) -> impl Iterator<Item = (usize, usize)> {
+        let alive = self.at[from].iter().copied().filter(|piece| self.alive[*piece]);
+        alive.map(move |piece| {
+            let ends = self.pieces[piece].ends;
+            (piece, if ends[0] == from { ends[1] } else { ends[0] })
         })
     }
 
-    /// Number of segments that end at each point.
-    fn degrees(&self) -> Vec<usize> {
-        let mut degrees = vec![0; self.points.len()];
-        self.pieces.iter().flat_map(|piece| piece.ends).for_each(|end| degrees[end] += 1);
-        degrees
+    /// Drops a piece.
+    pub(super) fn drop(&mut self, piece: usize) {
+        if std::mem::replace(&mut self.alive[piece], false) {
+            self.pieces[piece].ends.iter().for_each(|end| self.degrees[*end] -= 1);
+        }
     }
 
-    /// Removes the branches that lead from a meet point only to removed concave corners.
-    fn prune(&mut self, equidistant: &[usize]) {
-        loop {
-            let degrees = self.degrees();
-            let before = self.pieces.len();
-            self.pieces.retain(|piece| piece.ends.iter().all(|end| degrees[*end] > 1 || equidistant[*end] > 2));
-            if self.pieces.len() == before {
-                return;
+    /// Drops the pieces that are not wanted.
+    pub(super) fn retain(&mut self, mut is_wanted: impl FnMut(&Piece) -> bool) {
+        for index in 0..self.pieces.len() {
+            if self.alive[index] && !is_wanted(&self.pieces[index]) {
+                self.drop(index);
             }
         }
     }
 
-    /// Removes everything that is not connected to the segment nearest to a point.
-    fn keep_reachable(&mut self, start: Point) {
-        let to_start = |piece: &&Piece| {
-            let distances = piece.way.windows(2).map(|leg| leg[0].towards(leg[1], 0.5).distance_mm(start));
-            distances.fold(f64::MAX, f64::min)
-        };
-        let nearest = self.pieces.iter().min_by(|one, other| to_start(one).total_cmp(&to_start(other)));
-        let Some(mut reached) = nearest.map(|piece| vec![piece.ends[0]]) else { return };
-        let mut seen = vec![false; self.points.len()];
-        while let Some(point) = reached.pop() {
-            if !std::mem::replace(&mut seen[point], true) {
-                let touching = self.pieces.iter().filter(|piece| piece.ends.contains(&point));
-                reached.extend(touching.flat_map(|piece| piece.ends));
+    /// Drops what leads to nothing: from each loose end that is none, back to where others meet.
+    pub(super) fn trim(&mut self, mut is_end: impl FnMut(usize) -> bool) {
+        let mut loose: Vec<usize> = (0..self.points.len()).filter(|point| self.degrees[*point] == 1).collect();
+        while let Some(point) = loose.pop() {
+            if self.degrees[point] != 1 || is_end(point) {
+                continue;
+            }
+            let next = self.leaving(point).next();
+            if let Some((piece, other)) = next {
+                self.drop(piece);
+                loose.push(other);
             }
         }
-        self.pieces.retain(|piece| seen[piece.ends[0]]);
     }
 
-    /// The chains of segments from node to node.
-    fn chains(&self, node_of: &[Option<usize>]) -> Vec<TrueEdge> {
-        let mut used = vec![false; self.pieces.len()];
-        let mut edges = Vec::new();
+    /// The connected part of each point, counted from 0; `None` where no piece ends.
+    pub(super) fn parts(&self) -> Vec<Option<usize>> {
+        let mut parts = vec![None; self.points.len()];
+        let mut count = 0;
         for first in 0..self.points.len() {
-            let Some(first_node) = node_of[first] else { continue };
-            while let Some(mut way) = self.leave(first, &mut used) {
-                let mut at = way.1;
-                let last_node = loop {
-                    if let Some(node) = node_of[at] {
-                        break Some(node);
-                    }
-                    let Some((more, next)) = self.leave(at, &mut used) else { break None };
-                    way.0.extend_from_slice(&more[1..]);
-                    at = next;
-                };
-                if let Some(last_node) = last_node {
-                    edges.push(TrueEdge { nodes: [first_node, last_node], way: way.0 });
+            if parts[first].is_some() || self.degrees[first] == 0 {
+                continue;
+            }
+            let mut reached = vec![first];
+            while let Some(point) = reached.pop() {
+                if parts[point].replace(count).is_none() {
+                    reached.extend(self.leaving(point).map(|(_, other)| other));
                 }
             }
+            count += 1;
         }
-        edges
+        parts
     }
 
-    /// Takes an unused segment at a point and returns its polyline and the point at its other end.
-    fn leave(&self, point: usize, used: &mut [bool]) -> Option<(Vec<Point>, usize)> {
-        let index = (0..self.pieces.len()).find(|index| !used[*index] && self.pieces[*index].ends.contains(&point))?;
-        used[index] = true;
-        let Piece { ends, way } = &self.pieces[index];
-        if ends[0] == point {
-            Some((way.clone(), ends[1]))
-        } else {
-            Some((way.iter().rev().copied().collect(), ends[0]))
-        }
+    /// The way along a piece that begins at a point.
+    pub(super) fn way_from(&self, point: usize, piece: usize) -> Vec<Point> {
+        let Piece { ends, way, .. } = &self.pieces[piece];
+        if ends[0] == point { way.clone() } else { way.iter().rev().copied().collect() }
+    }
+
+    /// A point of the piece nearest to the start that can be seen from there, or of the nearest piece.
+    pub(super) fn nearest(&self, start: Point, walls: &Walls) -> Option<usize> {
+        let to_start = |piece: &Piece| {
+            let middles = piece.way.windows(2).map(|leg| leg[0].towards(leg[1], 0.5));
+            middles.map(|middle| (middle.distance_mm(start), middle)).min_by(|one, other| one.0.total_cmp(&other.0))
+        };
+        let mut by_distance: Vec<(f64, Point, usize)> = self
+            .alive()
+            .filter_map(|piece| to_start(piece).map(|(distance_mm, middle)| (distance_mm, middle, piece.ends[0])))
+            .collect();
+        by_distance.sort_by(|one, other| one.0.total_cmp(&other.0));
+        let seen = by_distance.iter().find(|(_, middle, _)| walls.is_in_sight(start, *middle));
+        seen.or(by_distance.first()).map(|(_, _, end)| *end)
     }
 }
 
-/// The points of a curved edge: the parabola between a corner and an axis-parallel wall surface.
-fn curve(
-    diagram: &Diagram,
-    faces: &[Face],
-    edge: EdgeIndex,
-    twin: EdgeIndex,
-    from: Point,
-    to: Point,
-) -> Result<Vec<Point>, BvError> {
-    let (one, other) = (diagram.cell(diagram.edge_get_cell(edge)?)?, diagram.cell(diagram.edge_get_cell(twin)?)?);
-    let (corner, surface) = if one.contains_point() { (one, other) } else { (other, one) };
-    let (surface, face) = (faces[surface.source_index().usize()], faces[corner.source_index().usize()]);
-    let corner = match corner.source_category() {
-        SourceCategory::SegmentEnd => face.to,
-        _ => face.from,
+/// Points, found by their place.
+#[derive(Default)]
+struct Points {
+    points: Vec<Point>,
+    by_cell: HashMap<(i64, i64), Vec<usize>>,
+}
+
+impl Points {
+    /// The index of a point, which is added when it is not there yet.
+    fn index(&mut self, point: Point) -> usize {
+        let cell = |at_mm: f64| (at_mm / SAME_MM).floor() as i64;
+        let (x, y) = (cell(point.x_mm), cell(point.y_mm));
+        let around = (x - 1..=x + 1).flat_map(|x| (y - 1..=y + 1).map(move |y| (x, y)));
+        let known = around.filter_map(|cell| self.by_cell.get(&cell)).flatten().copied();
+        let known = known.filter(|known| self.points[*known].distance_mm(point) < SAME_MM).min();
+        known.unwrap_or_else(|| {
+            self.points.push(point);
+            self.by_cell.entry((x, y)).or_default().push(self.points.len() - 1);
+            self.points.len() - 1
+        })
+    }
+}
+
+/// The smallest distance to the two walls beside an edge, in millimetres.
+fn clearance_mm(sites: [Site; 2], way: &[Point]) -> f64 {
+    let ends_mm = way.iter().map(|at| sites[0].distance_mm(*at)).fold(f64::INFINITY, f64::min);
+    let [Site::Corner(one), Site::Corner(other)] = sites else { return ends_mm };
+    // Between two corners the edge is nearest to both where it crosses the line through them.
+    let (middle, from, to) = (one.towards(other, 0.5), way[0], way[way.len() - 1]);
+    let crosses = from.distance_mm(middle).max(to.distance_mm(middle)) <= from.distance_mm(to);
+    if crosses { ends_mm.min(one.distance_mm(middle)) } else { ends_mm }
+}
+
+/// The points of a curved edge: the parabola between a corner and a wall surface.
+fn curve(sites: [Site; 2], from: Point, to: Point) -> Vec<Point> {
+    let ([Site::Corner(corner), Site::Surface(surface)] | [Site::Surface(surface), Site::Corner(corner)]) = sites
+    else {
+        return vec![from, to];
     };
-    let corner = Point::new(f64::from(corner.0), f64::from(corner.1));
-    let level = surface.from.1 == surface.to.1;
-    let height = |along: f64| {
-        let (focus, across, line) = match level {
-            true => (corner.x_mm, corner.y_mm, f64::from(surface.from.1)),
-            false => (corner.y_mm, corner.x_mm, f64::from(surface.from.0)),
-        };
-        (line + across) / 2.0 + (along - focus).powi(2) / (2.0 * (across - line))
+    let (base, end) = (point(surface.from), point(surface.to));
+    let length_mm = base.distance_mm(end);
+    let (along_x, along_y) = ((end.x_mm - base.x_mm) / length_mm, (end.y_mm - base.y_mm) / length_mm);
+    // In the frame of the surface: along it, and across to its left.
+    let in_frame = |at: Point| {
+        let (x, y) = (at.x_mm - base.x_mm, at.y_mm - base.y_mm);
+        (along_x * x + along_y * y, along_x * y - along_y * x)
     };
+    let ((focus_mm, height_mm), (from_mm, _), (to_mm, _)) = (in_frame(corner), in_frame(from), in_frame(to));
+    if height_mm.abs() < 0.1 {
+        return vec![from, to];
+    }
     let pieces = (from.distance_mm(to) / PIECE_MM).ceil().max(1.0);
     let inner = (1..pieces as usize).map(|piece| {
-        let chord = from.towards(to, piece as f64 / pieces);
-        match level {
-            true => Point::new(chord.x_mm, height(chord.x_mm)),
-            false => Point::new(height(chord.y_mm), chord.y_mm),
-        }
+        let at_mm = from_mm + (to_mm - from_mm) * (piece as f64 / pieces);
+        let across_mm = height_mm / 2.0 + (at_mm - focus_mm).powi(2) / (2.0 * height_mm);
+        let (x, y) = (along_x * at_mm - along_y * across_mm, along_y * at_mm + along_x * across_mm);
+        Point::new(base.x_mm + x, base.y_mm + y)
     });
-    Ok(std::iter::once(from).chain(inner).chain([to]).collect())
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    fn plan(rows: &[&str]) -> Plan {
-        Plan::parse(&format!("cell_mm 500\n{}", rows.join("\n"))).unwrap()
-    }
-
-    #[test]
-    fn a_corridor_has_a_dead_end_at_each_end() {
-        let map =
-            TrueMap::of(&plan(&["..............", ".S............", "..............", ".............."])).unwrap();
-        assert_eq!((map.nodes.len(), map.edges.len()), (2, 1));
-        for node in &map.nodes {
-            assert!((node.radius_mm - 1000.0).abs() < 1.0, "{node:?}");
-            assert_eq!(node.degree, 1);
-        }
-    }
-
-    #[test]
-    fn a_junction_has_the_radius_of_the_disc_between_wall_and_corners() {
-        let stem = "######....######";
-        let bar = "................";
-        let map = TrueMap::of(&plan(&[bar, bar, bar, bar, stem, stem, stem, stem, stem, "######.S..######"])).unwrap();
-        assert_eq!((map.nodes.len(), map.edges.len()), (4, 3));
-        let junction = map.nodes.iter().find(|node| node.degree == 3).unwrap();
-        // A disc that touches a wall at distance w and two corners 2c apart: (w² + c²) / 2w.
-        assert!((junction.radius_mm - 1250.0).abs() < 1.0, "{junction:?}");
-        assert!((junction.position.x_mm - 4000.0).abs() < 1.0 && (junction.position.y_mm - 3750.0).abs() < 1.0);
-    }
-
-    #[test]
-    fn every_point_of_an_edge_is_equidistant_from_two_obstacles() {
-        for (name, text) in Plan::BUILT_IN {
-            let plan = Plan::parse(text).unwrap();
-            let map = TrueMap::of(&plan).unwrap();
-            let faces = plan.faces();
-            for point in map.edges.iter().flat_map(|edge| &edge.way) {
-                let mut distances: Vec<f64> = faces.iter().map(|face| face.distance_mm(*point)).collect();
-                distances.sort_by(f64::total_cmp);
-                assert!(distances[1] - distances[0] < 1.0, "{name}: {point:?}");
-            }
-        }
-    }
+    std::iter::once(from).chain(inner).chain([to]).collect()
 }

@@ -45,7 +45,7 @@ pub(super) fn draw(frame: &mut Frame<'_>, area: Rect, model: &Model) {
         lines.push(Line::from(format!("saw {} mm{ways}", seen.radius_mm)));
     }
     if lines.is_empty() {
-        lines.push(Line::styled("no place was heard of yet", FAINT));
+        lines.push(Line::styled("no place yet", FAINT));
     }
     boxed(frame, area, "what it believes, and why", lines);
 }

@@ -95,7 +95,7 @@ fn heading(model: &Model) -> Line<'_> {
     let connection = match model.watch().connection() {
         Connection::Opening => Span::styled("opening", FAINT),
         Connection::Open => Span::styled("connected", GOOD),
-        Connection::Cut(_) => Span::styled("no line", BAD),
+        Connection::Lost(_) => Span::styled("no line", BAD),
         Connection::Ended => Span::styled("ended", FAINT),
     };
     let picture = model.watch().listener().replica();
@@ -117,7 +117,7 @@ fn heading(model: &Model) -> Line<'_> {
 /// Warnings at the top of the screen, each with its number of rows.
 fn banners(model: &Model, width: u16) -> Vec<(Paragraph<'_>, u16)> {
     let mut texts = Vec::new();
-    if let Connection::Cut(reason) = model.watch().connection() {
+    if let Connection::Lost(reason) = model.watch().connection() {
         texts.push((format!("no line: {reason}; trying again. What is shown is as it was."), ALARM));
     }
     let understanding = model.watch().listener().understanding();
@@ -127,10 +127,10 @@ fn banners(model: &Model, width: u16) -> Vec<(Paragraph<'_>, u16)> {
         Understanding::Not(_) => texts.push((format!("DO NOT TRUST WHAT IS SHOWN: {understanding}"), ALARM)),
     }
     if *model.watch().connection() == Connection::Open
-        && let Some(quiet) = model.quiet()
-        && quiet.as_secs_f64() >= QUIET_SECONDS
+        && let Some(silence) = model.silence()
+        && silence.as_secs_f64() >= QUIET_SECONDS
     {
-        texts.push((format!("nothing was heard for {} s", quiet.as_secs()), WARNING));
+        texts.push((format!("no data for {} s", silence.as_secs()), WARNING));
     }
     let rows = |text: &str| 1 + text.chars().count() as u16 / width.max(1);
     texts

@@ -26,7 +26,7 @@ pub(super) fn draw(frame: &mut Frame<'_>, area: Rect, model: &Model) {
     let range_mm = farthest_mm(&echoes);
     let title = match model.watch().listener().ring() {
         Some((index, _)) => format!("ring {index}, rim at {range_mm:.0} mm"),
-        None => "heading; no ring was heard".to_owned(),
+        None => "heading; no ring frame yet".to_owned(),
     };
     let block = Block::bordered().title(title);
     let inside = block.inner(area);
@@ -77,8 +77,8 @@ fn paint(context: &mut Context<'_>, model: &Model, echoes: &[Echo], range_mm: f6
 
 /// Number of sonars of the ring, if received.
 fn sonars(model: &Model, echoes: usize) -> usize {
-    let told = model.watch().listener().replica().hello().map_or(0, |hello| usize::from(hello.capacities.sonars));
-    told.max(echoes).max(1)
+    let reported = model.watch().listener().replica().hello().map_or(0, |hello| usize::from(hello.capacities.sonars));
+    reported.max(echoes).max(1)
 }
 
 fn farthest_mm(echoes: &[Echo]) -> f64 {

@@ -22,9 +22,9 @@ pub(super) fn draw(frame: &mut Frame<'_>, area: Rect, model: &Model) {
     if let Some(goal_status) = picture.goal_status() {
         lines.push(Line::from(format!("goal vertex {}: {}", goal_status.vertex, goal_status.state)));
     }
-    lines.extend(told(model));
+    lines.extend(reported(model));
     lines.push(faults(model));
-    lines.push(heard(model));
+    lines.push(received(model));
     if let Some(health) = picture.health() {
         lines.push(Line::from(format!(
             "up {:.0} s, {} turns, stack {} B, longest {} ms",
@@ -41,11 +41,11 @@ pub(super) fn draw(frame: &mut Frame<'_>, area: Rect, model: &Model) {
     boxed(frame, area, "what it does", lines);
 }
 
-fn told(model: &Model) -> Option<Line<'static>> {
-    let told = model.told();
-    let paused = told.paused.map(|on| if on { "paused" } else { "not paused" });
-    let mapping = told.localise_only.map(|on| if on { "localises only" } else { "maps" });
-    let stored = told.info.map(|info| match info.stored_bytes {
+fn reported(model: &Model) -> Option<Line<'static>> {
+    let reported = model.reported();
+    let paused = reported.paused.map(|on| if on { "paused" } else { "not paused" });
+    let mapping = reported.localise_only.map(|on| if on { "localises only" } else { "maps" });
+    let stored = reported.info.map(|info| match info.stored_bytes {
         0 => "no snapshot stored".to_owned(),
         bytes => format!("{bytes} B stored"),
     });
@@ -60,7 +60,7 @@ fn faults(model: &Model) -> Line<'static> {
     if named.is_empty() { Line::styled("no faults", GOOD) } else { Line::styled(named.join(", "), BAD) }
 }
 
-fn heard(model: &Model) -> Line<'static> {
+fn received(model: &Model) -> Line<'static> {
     let counters = model.watch().listener().counters();
     let unknown = counters.unknown_version.saturating_add(counters.unknown_message);
     let damaged = counters.corrupt.saturating_add(counters.cut).saturating_add(counters.too_long);

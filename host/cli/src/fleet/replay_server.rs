@@ -23,14 +23,14 @@ const MOST_MESSAGES: u32 = 30_000;
 
 /// The recorded stream of a simulated robot.
 #[derive(Clone, Debug)]
-pub struct Life {
+pub struct RecordedStream {
     bytes: Vec<u8>,
     /// Number of bytes sent by the end of each ring frame.
     ends: Vec<usize>,
     map: TopologicalMap,
 }
 
-impl Life {
+impl RecordedStream {
     /// Records a robot that explores a plan for a number of ring frames, or fewer if its stream exceeds the range of
     /// sequence numbers.
     ///
@@ -83,9 +83,9 @@ fn messages_in(bytes: &[u8]) -> u32 {
 
 /// Behaviour of a robot at the end of its recording.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Afterwards {
+pub enum AtEnd {
     /// Restarts with an empty map, as after a reset.
-    Again,
+    Restart,
     /// Stops sending, and keeps the line open.
     Silence,
 }
@@ -100,39 +100,42 @@ pub enum Pace {
 }
 
 /// The robots and their port.
-pub struct Crowd {
+pub struct ReplayServer {
     port: TcpListener,
-    lives: Vec<Life>,
+    streams: Vec<RecordedStream>,
     count: usize,
-    afterwards: Afterwards,
-    speakers: Vec<Option<Speaker>>,
+    at_end: AtEnd,
+    connections: Vec<Option<Connection>>,
 }
 
 /// A connected robot.
-struct Speaker {
+struct Connection {
     stream: TcpStream,
-    life: usize,
+    recorded: usize,
     /// Start of the current replay, in ring frames.
     frame: f64,
     /// Number of bytes sent in the current replay.
-    said: usize,
+    sent: usize,
 }
 
-impl Crowd {
-    /// Opens a port, `HOST:PORT`, for `count` robots. Robot `n` replays life `n` modulo the number of lives, and starts
+impl ReplayServer {
+    /// Opens a port, `HOST:PORT`, for `count` robots. Robot `n` replays stream `n` modulo the number of streams, and starts
     /// at the fraction `n / count` of its first half.
     ///
     /// # Errors
     /// If the address is not one of this computer, or is in use.
     ///
     /// # Panics
-    /// If there is no life, or one without ring frames.
-    pub fn bind(address: &str, lives: Vec<Life>, count: usize, afterwards: Afterwards) -> io::Result<Self> {
-        assert!(!lives.is_empty() && lives.iter().all(|life| life.frames() > 0), "every robot needs a recording");
+    /// If there is no stream, or one without ring frames.
+    pub fn bind(address: &str, streams: Vec<RecordedStream>, count: usize, at_end: AtEnd) -> io::Result<Self> {
+        assert!(
+            !streams.is_empty() && streams.iter().all(|recorded| recorded.frames() > 0),
+            "every robot needs a recording"
+        );
         let port = TcpListener::bind(address)?;
         port.set_nonblocking(true)?;
         cost::expect_many(&port, count)?;
-        Ok(Self { port, lives, count, afterwards, speakers: Vec::new() })
+        Ok(Self { port, streams, count, at_end, connections: Vec::new() })
     }
 
     /// The address of the listening socket.
@@ -144,45 +147,46 @@ impl Crowd {
     }
 
     /// Number of robots that have ever been connected.
-    pub const fn met(&self) -> usize {
-        self.speakers.len()
+    pub const fn accepted(&self) -> usize {
+        self.connections.len()
     }
 
     /// Number of connected robots.
-    pub fn heard(&self) -> usize {
-        self.speakers.iter().flatten().count()
+    pub fn connected(&self) -> usize {
+        self.connections.iter().flatten().count()
     }
 
     /// Advances all robots by some time, which is ignored at unlimited pace; never blocks. Returns the number of bytes
     /// sent.
-    pub fn live(&mut self, time: Duration, pace: Pace) -> usize {
+    pub fn send(&mut self, time: Duration, pace: Pace) -> usize {
         self.accept();
-        let mut said = 0;
-        for slot in &mut self.speakers {
-            let Some(speaker) = slot else { continue };
-            match speaker.live(&self.lives[speaker.life], time, pace, self.afterwards) {
-                Ok(bytes) => said += bytes,
+        let mut sent = 0;
+        for slot in &mut self.connections {
+            let Some(connection) = slot else { continue };
+            match connection.send(&self.streams[connection.recorded], time, pace, self.at_end) {
+                Ok(bytes) => sent += bytes,
                 Err(_) => *slot = None,
             }
         }
-        said
+        sent
     }
 
     fn accept(&mut self) {
-        while self.speakers.len() < self.count {
+        while self.connections.len() < self.count {
             let Ok((stream, _)) = self.port.accept() else { return };
-            let number = self.speakers.len();
-            let life_number = number % self.lives.len();
-            let life = &self.lives[life_number];
+            let number = self.connections.len();
+            let recorded_number = number % self.streams.len();
+            let recorded = &self.streams[recorded_number];
             // The fraction distributes the robots over a ring frame, so that they do not all send at once.
-            let frame = number as f64 / self.count as f64 * (life.frames() as f64 / 2.0);
-            let speaker = Speaker { stream, life: life_number, frame, said: life.bytes_before(frame as usize) };
-            self.speakers.push(speaker.prepare().ok());
+            let frame = number as f64 / self.count as f64 * (recorded.frames() as f64 / 2.0);
+            let connection =
+                Connection { stream, recorded: recorded_number, frame, sent: recorded.bytes_before(frame as usize) };
+            self.connections.push(connection.prepare().ok());
         }
     }
 }
 
-impl Speaker {
+impl Connection {
     fn prepare(self) -> io::Result<Self> {
         self.stream.set_nonblocking(true)?;
         self.stream.set_nodelay(true)?;
@@ -190,29 +194,29 @@ impl Speaker {
         Ok(self)
     }
 
-    fn live(&mut self, life: &Life, time: Duration, pace: Pace, afterwards: Afterwards) -> io::Result<usize> {
+    fn send(&mut self, recorded: &RecordedStream, time: Duration, pace: Pace, at_end: AtEnd) -> io::Result<usize> {
         let due = match pace {
             Pace::Times(speed) => {
                 self.frame += time.as_secs_f64() * speed / FRAME_TIME.as_secs_f64();
-                life.bytes_before(self.frame as usize)
+                recorded.bytes_before(self.frame as usize)
             }
-            Pace::Unbounded => (self.said + PIECE_BYTES).min(life.bytes()),
+            Pace::Unbounded => (self.sent + PIECE_BYTES).min(recorded.bytes()),
         };
         let mut written = 0;
-        while self.said < due {
-            match self.stream.write(&life.bytes[self.said..due]) {
+        while self.sent < due {
+            match self.stream.write(&recorded.bytes[self.sent..due]) {
                 Ok(0) => return Err(ErrorKind::WriteZero.into()),
                 Ok(count) => {
-                    self.said += count;
+                    self.sent += count;
                     written += count;
                 }
                 Err(error) if error.kind() == ErrorKind::WouldBlock => break,
                 Err(error) => return Err(error),
             }
         }
-        if self.said == life.bytes() && afterwards == Afterwards::Again {
-            self.said = 0;
-            self.frame = (self.frame - life.frames() as f64).max(0.0);
+        if self.sent == recorded.bytes() && at_end == AtEnd::Restart {
+            self.sent = 0;
+            self.frame = (self.frame - recorded.frames() as f64).max(0.0);
         }
         Ok(written)
     }

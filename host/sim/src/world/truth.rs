@@ -1,0 +1,446 @@
+//! The true map of a floor plan: what a robot of a given size with given sonars can tell (docs/plans.md has the definition).
+
+use super::branches::prune;
+use super::graph::Graph;
+use super::obstacles::Obstacles;
+use super::voronoi::{SAME_MM, Skeleton, VoronoiError};
+use super::walls::Walls;
+use super::{BodyModel, Plan, Point, SonarModel};
+use toposlam::place::PlaceConfig;
+
+/// Obstacles whose true ranges differ by no more than this are as near, in millimetres: three standard deviations of a range.
+const AS_NEAR_MM: f64 = 45.0;
+/// And by no more than this share of the nearest range.
+const AS_NEAR_SHARE: f64 = 0.1;
+
+/// Room that a robot needs beside its body, in millimetres: two standard deviations of a range.
+const PLAY_MM: f64 = 30.0;
+
+/// What a robot can drive through and tell apart.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Limits {
+    /// Half the robot's width, in millimetres.
+    pub body_radius_mm: f64,
+    /// Nothing farther is heard, in millimetres.
+    pub range_max_mm: f64,
+    /// Obstacles at least this far apart in bearing are two, in radians.
+    pub separation_rad: f64,
+    /// Obstacles closer by up to this are two where the range between them rises, in radians: half the cone of a sonar, because an
+    /// obstacle is heard up to that far aside.
+    pub cone_half_angle_rad: f64,
+    /// A place is left when the third obstacle is this much farther than the nearest, in millimetres.
+    pub leave_mm: f64,
+}
+
+impl Limits {
+    /// The limits of a robot that detects places by the default settings.
+    pub fn of(body: &BodyModel, sonar: &SonarModel) -> Self {
+        Self {
+            body_radius_mm: body.radius_mm,
+            range_max_mm: sonar.range_max_mm,
+            separation_rad: f64::from(PlaceConfig::DEFAULT.separation_mrad) / 1000.0,
+            cone_half_angle_rad: sonar.cone_half_angle_rad,
+            leave_mm: PlaceConfig::DEFAULT.leave_mm.into(),
+        }
+    }
+
+    /// What a branch must reach beyond the disc of its junction, and how far apart two places are, in millimetres.
+    pub(super) fn width_mm(&self) -> f64 {
+        2.0 * self.body_radius_mm
+    }
+}
+
+impl Default for Limits {
+    fn default() -> Self {
+        Self::of(&BodyModel::default(), &SonarModel::default())
+    }
+}
+
+/// A place of the true map.
+#[derive(Clone, Debug, PartialEq)]
+pub struct TrueNode {
+    /// Where it is.
+    pub position: Point,
+    /// Distance to the closest obstacles, in millimetres.
+    pub radius_mm: f64,
+    /// How many drivable edges end here.
+    pub degree: usize,
+    /// Every meet point that this place stands for, its own position included.
+    pub meet_points: Vec<Point>,
+    /// Whether the closest obstacles are beyond the range of the sonars.
+    pub is_hall: bool,
+}
+
+impl TrueNode {
+    /// The distance of a point to the nearest of its meet points, in millimetres.
+    pub fn distance_mm(&self, to: Point) -> f64 {
+        self.meet_points.iter().map(|point| point.distance_mm(to)).fold(f64::INFINITY, f64::min)
+    }
+}
+
+/// A drivable connection between two nodes.
+#[derive(Clone, Debug, PartialEq)]
+pub struct TrueEdge {
+    /// The nodes at its ends.
+    pub nodes: [usize; 2],
+    /// The way from the first node to the second.
+    pub way: Vec<Point>,
+}
+
+/// One end of an edge at one of its nodes.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct TrueWay {
+    /// The edge.
+    pub edge: usize,
+    /// Whether the node is the second of the edge.
+    pub is_reversed: bool,
+    /// Direction of the point where the edge leaves the disc of the node, counter-clockwise from the x axis, in radians.
+    pub bearing_rad: f64,
+}
+
+impl TrueWay {
+    /// The edge and the end, for comparison.
+    pub const fn dart(&self) -> (usize, bool) {
+        (self.edge, self.is_reversed)
+    }
+}
+
+impl TrueEdge {
+    /// Length of the polyline, in millimetres.
+    pub fn length_mm(&self) -> f64 {
+        self.way.windows(2).map(|ends| ends[0].distance_mm(ends[1])).sum()
+    }
+
+    /// The point at this fraction of the polyline.
+    pub fn point_at(&self, share: f64) -> Point {
+        let mut left_mm = share * self.length_mm();
+        for ends in self.way.windows(2) {
+            let leg_mm = ends[0].distance_mm(ends[1]);
+            if left_mm <= leg_mm {
+                return ends[0].towards(ends[1], if leg_mm > 0.0 { left_mm / leg_mm } else { 0.0 });
+            }
+            left_mm -= leg_mm;
+        }
+        self.way.last().copied().unwrap_or_default()
+    }
+}
+
+/// Meet points of the Voronoi diagram that are no places of the true map, by the reason.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Dropped {
+    /// The body does not fit there.
+    pub narrow: usize,
+    /// They cannot be reached from the start.
+    pub unreachable: usize,
+    /// They lie on branches that do not lead on.
+    pub branches: usize,
+    /// No three obstacles are apart in bearing, and the way does not fork.
+    pub smooth: usize,
+    /// They are one place with another.
+    pub merged: usize,
+    /// The sonars do not reach the obstacles, and the way does not fork.
+    pub halls: usize,
+}
+
+/// A part of a plan that cannot be reached from the start.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct UnreachablePart {
+    /// Its most open meet point.
+    pub position: Point,
+    /// The distance to the closest obstacles there, in millimetres.
+    pub radius_mm: f64,
+    /// How many meet points it has.
+    pub meet_points: usize,
+}
+
+/// The true places of a floor plan and their connections, as far as they can be reached from the start.
+#[derive(Clone, Debug, PartialEq)]
+pub struct TrueMap {
+    /// The places.
+    pub nodes: Vec<TrueNode>,
+    /// The connections.
+    pub edges: Vec<TrueEdge>,
+    /// The meet points that are no places.
+    pub dropped: Dropped,
+    /// The parts where the body fits and that it cannot reach, the one with the most meet points first.
+    pub unreachable: Vec<UnreachablePart>,
+}
+
+impl TrueMap {
+    /// The true map of a plan; [`Plan::true_map`] computes it once.
+    ///
+    /// # Errors
+    /// When the start does not reach any place.
+    pub fn of(plan: &Plan, limits: &Limits) -> Result<Self, VoronoiError> {
+        let walls = plan.walls();
+        let mut skeleton = Skeleton::of(plan)?;
+        let equidistant = skeleton.degrees().to_vec();
+        let is_meet_point = |point: usize| equidistant[point] > 2;
+        let radii_mm: Vec<f64> = skeleton.points.iter().map(|point| walls.clearance_mm(*point)).collect();
+        let count = |skeleton: &Skeleton| {
+            let degrees = skeleton.degrees().iter().enumerate();
+            degrees.filter(|(point, degree)| **degree > 0 && is_meet_point(*point)).count()
+        };
+        let mut dropped = Dropped::default();
+
+        let parts = skeleton.parts();
+        let room = skeleton.nearest(plan.start(), walls).and_then(|start| parts[start]);
+        let in_room = (0..radii_mm.len()).filter(|point| parts[*point] == room);
+        let widest = in_room.max_by(|one, other| radii_mm[*one].total_cmp(&radii_mm[*other]));
+
+        // Nobody drives into a corner.
+        skeleton.retain(|piece| piece.ends.iter().all(|end| radii_mm[*end] >= SAME_MM));
+        skeleton.trim(is_meet_point);
+        let all = count(&skeleton);
+        skeleton.retain(|piece| piece.clearance_mm >= limits.body_radius_mm + PLAY_MM);
+        skeleton.trim(is_meet_point);
+        let fitting = count(&skeleton);
+        dropped.narrow = all - fitting;
+
+        let parts = skeleton.parts();
+        let start = skeleton.nearest(plan.start(), walls);
+        let part = start.and_then(|start| parts[start]);
+        let unreachable = unreachable(&skeleton, &parts, part, &radii_mm, is_meet_point);
+        skeleton.retain(|piece| parts[piece.ends[0]] == part);
+        let reachable = count(&skeleton);
+        dropped.unreachable = fitting - reachable;
+
+        let is_apart = |point: usize| {
+            let radius_mm = radii_mm[point];
+            let reach_mm = radius_mm + AS_NEAR_MM.min(AS_NEAR_SHARE * radius_mm);
+            let around = || Obstacles::around(walls, skeleton.points[point], reach_mm, limits);
+            is_meet_point(point) && around().spread_mm().is_some()
+        };
+        let apart: Vec<bool> =
+            (0..radii_mm.len()).map(|point| skeleton.degrees()[point] > 0 && is_apart(point)).collect();
+        skeleton.trim(|point| apart[point]);
+        prune(&mut skeleton, &radii_mm, limits.width_mm());
+        skeleton.trim(|point| apart[point]);
+        let branching = count(&skeleton);
+        dropped.branches = reachable - branching;
+
+        let is_place = |point: usize| match skeleton.degrees()[point] {
+            0 => false,
+            2 => apart[point],
+            _ => true,
+        };
+        let places: Vec<usize> = (0..radii_mm.len()).filter(|point| is_place(*point)).collect();
+        dropped.smooth = branching.saturating_sub(places.len());
+        let mut graph = Graph::of(&skeleton, &places, &radii_mm, &apart);
+        dropped.halls = graph.join_halls(walls, limits);
+        dropped.merged = graph.merge(walls, limits);
+        if graph.nodes.is_empty() {
+            // A room without a way out is one place.
+            let fits = |point: &usize| radii_mm[*point] >= limits.body_radius_mm && skeleton.alive().next().is_none();
+            let only = widest.filter(fits).ok_or(VoronoiError::NoPlace)?;
+            graph.add_node(skeleton.points[only], radii_mm[only], true);
+        }
+        let (nodes, edges) = graph.finish(limits);
+        Ok(Self { nodes, edges, dropped, unreachable })
+    }
+
+    /// The ways of a node, counter-clockwise by their bearing from its position. A loop is two of them.
+    pub fn ways(&self, node: usize) -> Vec<TrueWay> {
+        let mut ways = Vec::new();
+        for (edge, true_edge) in self.edges.iter().enumerate() {
+            for is_reversed in [false, true] {
+                if true_edge.nodes[usize::from(is_reversed)] == node {
+                    ways.push(self.way(edge, is_reversed));
+                }
+            }
+        }
+        ways.sort_by(|one, other| one.bearing_rad.total_cmp(&other.bearing_rad));
+        ways
+    }
+
+    /// One end of an edge: the first node is that of the way, or the second if it is reversed.
+    pub fn way(&self, edge: usize, is_reversed: bool) -> TrueWay {
+        let TrueEdge { nodes, way } = &self.edges[edge];
+        let node = &self.nodes[nodes[usize::from(is_reversed)]];
+        let mut points: Vec<Point> = way.clone();
+        if is_reversed {
+            points.reverse();
+        }
+        let is_outside = |point: &&Point| node.position.distance_mm(**point) >= node.radius_mm;
+        let aim = points.iter().find(is_outside).or(points.last()).copied().unwrap_or_default();
+        TrueWay { edge, is_reversed, bearing_rad: node.position.direction_to(aim) }
+    }
+
+    /// The node nearest to a point, and its distance in millimetres.
+    pub fn nearest_node(&self, point: Point) -> Option<(usize, f64)> {
+        let distances = self.nodes.iter().map(|node| node.distance_mm(point)).enumerate();
+        distances.min_by(|one, other| one.1.total_cmp(&other.1))
+    }
+}
+
+/// The parts of a graph but one, by their meet points.
+fn unreachable(
+    skeleton: &Skeleton,
+    parts: &[Option<usize>],
+    reached: Option<usize>,
+    radii_mm: &[f64],
+    is_meet_point: impl Fn(usize) -> bool,
+) -> Vec<UnreachablePart> {
+    let mut found: Vec<UnreachablePart> = Vec::new();
+    let mut index_of = vec![None; parts.len()];
+    for (point, part) in parts.iter().enumerate() {
+        let Some(part) = part.filter(|part| Some(*part) != reached && is_meet_point(point)) else { continue };
+        let index = *index_of[part].get_or_insert_with(|| {
+            found.push(UnreachablePart { position: Point::default(), radius_mm: 0.0, meet_points: 0 });
+            found.len() - 1
+        });
+        let entry = &mut found[index];
+        entry.meet_points += 1;
+        if radii_mm[point] > entry.radius_mm {
+            (entry.position, entry.radius_mm) = (skeleton.points[point], radii_mm[point]);
+        }
+    }
+    found.sort_by_key(|part| std::cmp::Reverse(part.meet_points));
+    found
+}
+
+/// The distance to walls at the narrowest point of a way, in millimetres.
+pub(super) fn narrowest_mm(walls: &Walls, way: &[Point]) -> f64 {
+    way.iter().map(|point| walls.clearance_mm(*point)).fold(f64::INFINITY, f64::min)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn plan(rows: &[&str]) -> Plan {
+        Plan::parse(&format!("cell_mm 500\n{}", rows.join("\n"))).unwrap()
+    }
+
+    fn truth(plan: &Plan) -> TrueMap {
+        TrueMap::of(plan, &Limits::default()).unwrap()
+    }
+
+    /// A plan of 20 by 20 m with light and dark shapes.
+    fn drawing(shapes: &str) -> Plan {
+        Plan::parse(&format!(
+            "<svg xmlns='http://www.w3.org/2000/svg' viewBox='0 0 20000 20000' fill='white'>{shapes}</svg>"
+        ))
+        .unwrap()
+    }
+
+    fn degrees(map: &TrueMap) -> Vec<usize> {
+        let mut degrees: Vec<usize> = map.nodes.iter().map(|node| node.degree).collect();
+        degrees.sort_unstable();
+        degrees
+    }
+
+    #[test]
+    fn a_corridor_has_a_dead_end_at_each_end() {
+        let map = truth(&plan(&["..............", ".S............", "..............", ".............."]));
+        assert_eq!((map.nodes.len(), map.edges.len()), (2, 1));
+        for node in &map.nodes {
+            assert!((node.radius_mm - 1000.0).abs() < 1.0, "{node:?}");
+            assert_eq!(node.degree, 1);
+        }
+    }
+
+    #[test]
+    fn a_junction_has_the_radius_of_the_disc_between_wall_and_corners() {
+        let stem = "######....######";
+        let bar = "................";
+        let map = truth(&plan(&[bar, bar, bar, bar, stem, stem, stem, stem, stem, "######.S..######"]));
+        assert_eq!((map.nodes.len(), map.edges.len()), (4, 3));
+        let junction = map.nodes.iter().find(|node| node.degree == 3).unwrap();
+        // A disc that touches a wall at distance w and two corners 2c apart: (w² + c²) / 2w.
+        assert!((junction.radius_mm - 1250.0).abs() < 1.0, "{junction:?}");
+        assert!((junction.position.x_mm - 4000.0).abs() < 1.0 && (junction.position.y_mm - 3750.0).abs() < 1.0);
+    }
+
+    #[test]
+    fn every_point_of_an_edge_is_equidistant_from_two_obstacles() {
+        for (name, _) in Plan::BUILT_IN {
+            let plan = Plan::built_in(name).unwrap();
+            let map = truth(&plan);
+            for point in map.edges.iter().flat_map(|edge| &edge.way) {
+                let segments = plan.walls().segments().iter();
+                let mut distances: Vec<f64> = segments.map(|face| face.distance_mm(*point)).collect();
+                distances.sort_by(f64::total_cmp);
+                assert!(distances[1] - distances[0] < 1.0, "{name}: {point:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_rectangle_has_a_place_at_each_end_and_a_square_one_place() {
+        assert_eq!(degrees(&truth(&drawing("<rect x='1000' y='1000' width='8000' height='3000'/>"))), [1, 1]);
+        let square = truth(&drawing("<rect x='1000' y='1000' width='4000' height='4000'/>"));
+        assert_eq!(degrees(&square), [0]);
+        assert!((square.nodes[0].radius_mm - 2000.0).abs() < 1.0);
+        // The two ends of a nearly square room are never left for each other.
+        let nearly = truth(&drawing("<rect x='1000' y='1000' width='4300' height='4000'/>"));
+        assert_eq!((degrees(&nearly), nearly.dropped.merged), (vec![0], 1));
+    }
+
+    #[test]
+    fn corridors_meet_in_a_t_and_in_a_plus() {
+        let bar = "<rect x='1000' y='9000' width='18000' height='2000'/>";
+        let t = truth(&drawing(&format!("{bar}<rect x='9000' y='9000' width='2000' height='10000'/>")));
+        assert_eq!((degrees(&t), t.edges.len()), (vec![1, 1, 1, 3], 3));
+        let plus = truth(&drawing(&format!("{bar}<rect x='9000' y='1000' width='2000' height='18000'/>")));
+        assert_eq!((degrees(&plus), plus.edges.len()), (vec![1, 1, 1, 1, 4], 4));
+        // Two side corridors opposite each other, a little aside, are one junction.
+        let sides =
+            "<rect x='8850' y='1000' width='2000' height='9000'/><rect x='9150' y='10000' width='2000' height='9000'/>";
+        let twins = truth(&drawing(&format!("{bar}{sides}")));
+        assert_eq!((degrees(&twins), twins.dropped.merged), (vec![1, 1, 1, 1, 4], 1));
+    }
+
+    #[test]
+    fn a_door_is_a_junction_and_its_room_a_dead_end() {
+        let corridor = "<rect x='1000' y='9000' width='18000' height='2000'/>";
+        let room = "<rect x='8000' y='4900' width='4000' height='4000'/>";
+        for width_mm in [800, 900, 1200, 1600] {
+            let door = format!("<rect x='10000' y='8800' width='{width_mm}' height='300'/>");
+            let map = truth(&drawing(&format!("{corridor}{room}{door}")));
+            let in_room = |node: &&TrueNode| node.position.y_mm > 11_000.0;
+            assert_eq!(map.nodes.iter().filter(in_room).filter(|node| node.degree == 1).count(), 1, "{width_mm}");
+            let junctions: Vec<&TrueNode> = map.nodes.iter().filter(|node| node.degree == 3).collect();
+            assert!(matches!(junctions[..], [junction] if !in_room(&junction)), "{width_mm}: {junctions:?}");
+        }
+        // A robot 300 mm wide does not fit through a gap of 250 mm.
+        let gap = truth(&drawing(&format!("{corridor}{room}<rect x='10000' y='8800' width='250' height='300'/>")));
+        assert_eq!((degrees(&gap), gap.unreachable.len()), (vec![1, 1], 1));
+    }
+
+    #[test]
+    fn a_slanted_corridor_has_two_ends_whether_its_walls_are_straight_or_stepped() {
+        let straight = truth(&drawing("<polygon points='2000 3000 3000 1500 18000 12000 17000 13500'/>"));
+        assert_eq!(degrees(&straight), [1, 1]);
+        let (sine, cosine) = 35f64.to_radians().sin_cos();
+        let cell = |x: i32, y: i32| {
+            let (x, y) = (f64::from(x) - 75.0, f64::from(y) - 60.0);
+            let is_free = (x * cosine + y * sine).abs() < 70.0 && (y * cosine - x * sine).abs() < 9.0;
+            if is_free { '.' } else { '#' }
+        };
+        let stepped: Vec<String> = (0..120).map(|y| (0..150).map(|x| cell(x, y)).collect()).collect();
+        let stepped = truth(&Plan::parse(&format!("cell_mm 100\n{}", stepped.join("\n"))).unwrap());
+        assert_eq!(degrees(&stepped), [1, 1], "{:?}", stepped.nodes);
+    }
+
+    #[test]
+    fn a_niche_that_is_no_deeper_than_the_robot_is_wide_is_no_place() {
+        let with_niche = |depth_mm: u32| {
+            let niche = format!("<rect x='9000' y='{}' width='800' height='{}'/>", 9000 - depth_mm, depth_mm + 10);
+            degrees(&truth(&drawing(&format!("<rect x='1000' y='9000' width='18000' height='2000'/>{niche}"))))
+        };
+        assert_eq!(with_niche(150), [1, 1]);
+        assert_eq!(with_niche(800), [1, 1, 1, 3]);
+    }
+
+    #[test]
+    fn a_hall_wider_than_the_sonars_reach_is_crossed_or_one_place() {
+        let hall = "<rect x='3000' y='3000' width='14000' height='14000'/><rect x='500' y='9000' width='19000' height='2000'/>";
+        let crossed = truth(&drawing(hall));
+        assert_eq!((degrees(&crossed), crossed.edges.len()), (vec![1, 1], 1));
+        assert!(crossed.dropped.halls > 0);
+        let forked = truth(&drawing(&format!("{hall}<rect x='9000' y='500' width='2000' height='9000'/>")));
+        assert_eq!(degrees(&forked), [1, 1, 1, 3]);
+        assert_eq!(forked.nodes.iter().filter(|node| node.is_hall).count(), 1);
+    }
+}
