@@ -130,7 +130,9 @@ mod tests {
     fn update(estimate: &mut RotationEstimate, sensors: &[usize]) -> i32 {
         let mut ranges_mm = [SILENT_MM; 16];
         sensors.iter().for_each(|&sensor| ranges_mm[sensor] = 800);
-        estimate.update(&ranges_mm, &RingGeometry::even());
+        let mut geometry = RingGeometry::even();
+        geometry.bearings_mrad.sort_unstable();
+        estimate.update(&ranges_mm, &geometry);
         estimate.rotation_mrad()
     }
 
@@ -138,27 +140,51 @@ mod tests {
     fn a_rotation_by_one_sensor_a_frame_is_estimated_although_some_sensors_measure_the_same() {
         let mut estimate = RotationEstimate::new();
         update(&mut estimate, &[0, 4, 8]);
-        for frame in 1..8 {
-            let sensors = [0, 4, 8].map(|sensor| (sensor + 16 - frame) % 16);
-            assert!((update(&mut estimate, &sensors) + 393).abs() <= 2, "frame {frame}");
+        for frame in 1..40 {
+            let sensors = [0, 4, 8].map(|sensor| (sensor + 48 - frame) % 16);
+            assert!((update(&mut estimate, &sensors) + 393).abs() <= 3, "frame {frame} {}", estimate.rotation_mrad());
         }
+    }
+
+    #[test]
+    fn the_errors_of_a_turn_in_place_do_not_add_up() {
+        // Three turns by a third of a sensor in each frame: the frames show only whole sensors.
+        let mut estimate = RotationEstimate::new();
+        let mut turned_mrad = 0;
+        for frame in 0..145 {
+            turned_mrad += update(&mut estimate, &[0, 3, 4, 9].map(|sensor| (sensor + (frame + 1) / 3) % 16));
+        }
+        assert!((turned_mrad - 3 * 6283).abs() < 20, "{turned_mrad}");
     }
 
     #[test]
     fn an_obstacle_that_disappears_or_appears_does_not_change_the_estimate() {
         let mut estimate = RotationEstimate::new();
         update(&mut estimate, &[0, 4, 8]);
-        assert!((update(&mut estimate, &[7, 15]) + 393).abs() <= 2);
-        assert!((update(&mut estimate, &[2, 6, 14]) + 393).abs() <= 2);
+        assert!((update(&mut estimate, &[7, 15]) + 393).abs() <= 40, "{}", estimate.rotation_mrad());
+        assert!((update(&mut estimate, &[2, 6, 14]) + 393).abs() <= 40, "{}", estimate.rotation_mrad());
+    }
+
+    #[test]
+    fn where_no_rotation_explains_a_frame_the_next_ones_are_compared_with_it() {
+        let mut estimate = RotationEstimate::new();
+        update(&mut estimate, &[0, 4, 8]);
+        update(&mut estimate, &[1, 2, 6, 7, 11, 12]);
+        assert!((update(&mut estimate, &[2, 3, 7, 8, 12, 13]) - 393).abs() <= 40, "{}", estimate.rotation_mrad());
+        for _ in 0..4 {
+            update(&mut estimate, &[2, 3, 7, 8, 12, 13]);
+        }
+        assert_eq!(estimate.rotation_mrad(), 0, "the rotation stops when the obstacles do");
     }
 
     #[test]
     fn without_obstacles_the_rotation_continues() {
         let mut estimate = RotationEstimate::new();
-        update(&mut estimate, &[0, 4, 8]);
-        update(&mut estimate, &[1, 5, 9]);
-        assert!((update(&mut estimate, &[]) - 393).abs() <= 2);
-        assert!((update(&mut estimate, &[3, 7, 11]) - 393).abs() <= 2);
-        assert!(update(&mut estimate, &[3, 7, 11]).abs() <= 2, "the rotation stops when the obstacles do");
+        for frame in 0..6 {
+            update(&mut estimate, &[0, 4, 8].map(|sensor| (sensor + frame) % 16));
+        }
+        assert!((update(&mut estimate, &[]) - 393).abs() <= 20, "{}", estimate.rotation_mrad());
+        assert!((update(&mut estimate, &[7, 11, 15]) - 393).abs() <= 20, "{}", estimate.rotation_mrad());
+        assert!(update(&mut estimate, &[7, 11, 15]).abs() <= 2, "the rotation stops when the obstacles do");
     }
 }
