@@ -193,8 +193,8 @@ mod tests {
     fn poses(legs: usize) -> Vec<Option<Pose>> {
         let leg = |leg: usize| {
             (0..40).map(move |step| {
-                let x_mm = 250.0 * f64::from(if leg % 2 == 0 { step } else { 40 - step });
-                Some(Pose { x_mm, y_mm: 0.0, theta_rad: if leg % 2 == 0 { 0.0 } else { 3.0 } })
+                let x_mm = 250.0 * f64::from(if leg.is_multiple_of(2) { step } else { 40 - step });
+                Some(Pose { x_mm, y_mm: 0.0, theta_rad: if leg.is_multiple_of(2) { 0.0 } else { 3.0 } })
             })
         };
         (0..legs).flat_map(leg).collect()
