@@ -106,7 +106,7 @@ fn proximity_profile<const SONARS: usize>(ranges_mm: &[u16; SONARS], geometry: &
         let proximity = if range_mm == SILENT_MM { 0 } else { PROXIMITY / i32::from(range_mm.max(NEAREST_MM)) };
         ((i32::from(bearing_mrad) + 3142) * 65_536 / 6283, proximity)
     });
-    let Some((last, last_proximity)) = live.clone().last() else { return profile };
+    let Some((last, last_proximity)) = live.clone().next_back() else { return profile };
     let (mut from, mut from_proximity) = (last - 65_536, last_proximity);
     for (to, to_proximity) in live {
         let mut bin = (from + BIN - 1).div_euclid(BIN);
