@@ -65,6 +65,46 @@ fn plan_lists_the_places_of_a_map_draws_them_and_warns() {
 }
 
 #[test]
+fn explore_prints_a_row_for_each_plan_and_noise_and_for_each_run() {
+    let short = ["explore", "--plans", "flat", "--noises", "1", "--runs", "2", "--places", "6", "--goals", "0"];
+    let with = |more: &[&str]| printed(&toposlam(&[&short[..], more].concat()));
+    let text = with(&["--runs-table", "--seed", "7"]);
+    assert!(text.starts_with("| Plan | Noise | Exact maps | Visited all | Complete |"), "{text}");
+    assert!(text.contains("\n| flat | 1 | 7 | ") && text.contains("\n| flat | 1 | 8 | "), "{text}");
+    let report: serde_json::Value = serde_json::from_str(&with(&["--format", "json"])).unwrap();
+    let row = &report["rows"][0];
+    assert_eq!((&row["plan"], &row["runs"], &row["complete"]), (&"flat".into(), &2.into(), &0.0.into()));
+    for key in ["exact", "located", "edge_f1", "found", "missed", "doubled", "phantom", "lost", "wall_frames"] {
+        assert!(row[key].is_number(), "{key}: {row}");
+    }
+}
+
+#[test]
+fn another_ring_is_compared_with_the_reference_ring() {
+    let directory = tempfile::tempdir().unwrap();
+    let ring = directory.path().join("eight.toml");
+    std::fs::write(&ring, "sonars = 8\ncone_deg = 45\n").unwrap();
+    let ring = ring.to_str().unwrap();
+    let text = printed(&toposlam(&["simulate", "--plan", "plus", "--places", "4", "--ring", ring]));
+    assert!(text.contains("against the true map: exact ") && text.contains("the reference robot: exact "), "{text}");
+    let short = ["--plans", "plus", "--noises", "1", "--runs", "1", "--places", "4", "--goals", "0"];
+    let text = printed(&toposlam(&[&["explore", "--ring", ring][..], &short].concat()));
+    assert!(text.contains("\n| eight | plus | 1 | "), "{text}");
+    std::fs::write(ring, "sonars = 9\n").unwrap();
+    let error = complaint(&toposlam(&["simulate", "--ring", ring]));
+    assert!(error.contains("sonars must be 4, 5, 8, 12, 16 or 24, not 9"), "{error}");
+}
+
+#[test]
+fn a_map_without_a_place_is_not_exact() {
+    let text = printed(&toposlam(&["simulate", "--frames", "5"]));
+    assert!(
+        text.contains("against the true map: exact no, isomorphic no, complete no, whole plan driven no"),
+        "{text}"
+    );
+}
+
+#[test]
 fn a_fleet_of_another_process_is_monitored_without_loss() {
     let text = printed(&toposlam(&["fleet", "--simulate", "3", "--seconds", "1", "--speed", "0"]));
     assert!(text.contains("3 connected, 0 closed, 0 failed"), "{text}");

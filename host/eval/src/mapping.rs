@@ -228,6 +228,9 @@ pub fn score_path<const V: usize>(
     let class = |node: usize| visited.binary_search(&node).ok();
     let real = path.iter().zip(nodes).filter_map(|(&vertex, &node)| Some((vertex?, class(node?)?)));
     let (path, classes): (Vec<usize>, Vec<usize>) = real.unzip();
+    if classes.is_empty() {
+        return MapScore { exact: false, isomorphic: false, edge_f1: 0.0, location: 0.0 };
+    }
     let is_edge = |&(from, to): &(usize, usize)| {
         let ends = [visited[from], visited[to]];
         truth.edges.iter().any(|edge| edge.nodes == ends || edge.nodes == [ends[1], ends[0]])
@@ -239,7 +242,7 @@ pub fn score_path<const V: usize>(
 
 /// Scores the best map of a robot. A map with ways is exact if it has the driven edges in the order of the ways of the true map,
 /// parallel edges and loops included, up to a symmetry of the building.
-pub fn score_exploration<const V: usize, F>(exploration: &Exploration<'_, V, F>) -> MapScore
+pub fn score_exploration<const V: usize, F, const S: usize>(exploration: &Exploration<'_, V, F, S>) -> MapScore
 where
     F: Filter<V, Config: FilterSettings> + Persist,
 {
@@ -252,15 +255,28 @@ where
 }
 
 /// Whether a map has the driven edges, in the order of the ways of the true map and up to a symmetry of the building. Frontiers do
-/// not count.
+/// not count. Without a detected place no map is right.
 pub fn has_driven_ways(darts: Darts<'_>, ground_truth: &GroundTruth) -> bool {
     let truth = ground_truth.true_map();
+    if ground_truth.detections().is_empty() {
+        return false;
+    }
     let mut is_driven = vec![false; truth.edges.len()];
     ground_truth.driven().into_iter().flatten().for_each(|(edge, _)| is_driven[edge] = true);
     let is_visited = |node: &usize| truth.ways(*node).iter().any(|way| is_driven[way.edge]);
     let visited: Vec<usize> = (0..truth.nodes.len()).filter(is_visited).collect();
     let driven = RotationSystem::from(truth).part(&visited, |edge| is_driven[edge]);
     RotationSystem::from(darts).is_isomorphic_to(&driven)
+}
+
+/// Whether the robot visited all nodes and drove all edges of the true map.
+pub fn is_whole(ground_truth: &GroundTruth) -> bool {
+    let truth = ground_truth.true_map();
+    let mut is_driven = vec![false; truth.edges.len()];
+    ground_truth.driven().into_iter().flatten().for_each(|(edge, _)| is_driven[edge] = true);
+    let visited: std::collections::BTreeSet<usize> =
+        ground_truth.detections().iter().filter_map(|detection| detection.node).collect();
+    visited.len() == truth.nodes.len() && !is_driven.contains(&false)
 }
 
 fn started<const SONARS: usize, const V: usize, F: Filter<V>>(

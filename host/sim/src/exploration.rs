@@ -83,7 +83,7 @@ impl Board for MemoryBoard {
     }
 }
 
-/// A robot with any filter and a ring of 4, 8 or 16 sensors, its world and the ground truth of its drive.
+/// A robot with any filter and a ring of up to 24 sensors, its world and the ground truth of its drive.
 pub struct Exploration<'buffer, const V: usize = VERTICES, F: Filter<V> = reference::Filter, const S: usize = SONARS> {
     rover: Rover,
     robot: Box<Robot<'buffer, S, V, F>>,
@@ -132,7 +132,25 @@ where
         config: &RobotConfig<S, F::Config>,
         buffer: &'buffer mut [u8],
     ) -> Result<Self, VoronoiError> {
-        let rover = Rover::new(plan, model, BodyModel::default(), seed)?;
+        Self::with_body(plan, model, BodyModel::default(), seed, config, buffer)
+    }
+
+    /// As [`Exploration::with_robot`], with another body and other wheels.
+    ///
+    /// # Errors
+    /// As [`Exploration::start`].
+    ///
+    /// # Panics
+    /// If a setting of the robot is out of its range.
+    pub fn with_body(
+        plan: &Plan,
+        model: RobotModel,
+        body: BodyModel,
+        seed: u64,
+        config: &RobotConfig<S, F::Config>,
+        buffer: &'buffer mut [u8],
+    ) -> Result<Self, VoronoiError> {
+        let rover = Rover::new(plan, model, body, seed)?;
         let mut robot = Box::new(Robot::new());
         robot.start(config, buffer).expect("the settings of the robot are valid");
         let ground_truth = GroundTruth::new(rover.true_map());

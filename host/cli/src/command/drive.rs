@@ -11,8 +11,9 @@ use toposlam::wire::{FilterSettings, map_digest};
 use toposlam::{Darts, FaultCounters, Filter, Map};
 use toposlam_cli::picture::{Drawing, draw};
 use toposlam_eval::faults::fault_lines;
-use toposlam_eval::mapping::{has_driven_ways, score_path};
+use toposlam_eval::mapping::{has_driven_ways, is_whole, score_path};
 use toposlam_sim::exploration::Exploration;
+use toposlam_sim::hardware::Hardware;
 use toposlam_sim::world::{GroundTruth, Plan, RobotModel, TrueMap};
 
 /// The floor plan, the seed and the noise.
@@ -60,6 +61,11 @@ impl DriveArguments {
         Ok((load_plan(&self.plan, self.start)?, RobotModel::for_ring(sonars).with_noise(self.noise)))
     }
 
+    /// The floor plan, and a robot of this hardware with its noise.
+    pub(super) fn world_for(&self, hardware: &Hardware) -> anyhow::Result<(Plan, RobotModel)> {
+        Ok((load_plan(&self.plan, self.start)?, hardware.model().with_noise(self.noise)))
+    }
+
     /// The floor plan argument.
     pub(super) fn plan(&self) -> &str {
         &self.plan
@@ -72,29 +78,16 @@ impl DriveArguments {
 
     /// Prints the detected places and the scores of the map, and writes the SVG file if `--svg` is given.
     pub(super) fn summarise<const V: usize>(&self, drive: &Summary<'_, V>) -> anyhow::Result<()> {
-        let Summary { plan, truth, ground_truth, map, darts, is_complete, path, faults } = drive;
+        let Summary { plan, truth, ground_truth, map, darts, path, faults, .. } = drive;
         let detections = ground_truth.detections();
         println!("\n{}: {} places in {} visits", self.plan, detections.len(), ground_truth.visits());
         println!("{}", ground_truth.report());
-        let nodes: Vec<Option<usize>> = detections.iter().map(|detection| detection.node).collect();
-        let score = score_path(map, path, truth, &nodes);
-        let exact = darts.map(|darts| has_driven_ways(darts, ground_truth));
         let (vertices, edges) = (map.vertices().len(), map.edges().count());
         println!("map: {vertices} vertices, {edges} edges, digest {:08x}", map_digest(map, *darts));
         if let Some(darts) = darts {
-            println!(
-                "ways that nobody has driven: {}, complete {}",
-                darts.frontiers().count(),
-                yes_or_no(*is_complete)
-            );
+            println!("ways that nobody has driven: {}", darts.frontiers().count());
         }
-        println!(
-            "against the true map: exact {}, isomorphic {}, edge F1 {:.2}, located in {:.0} % of the places",
-            yes_or_no(exact.unwrap_or(score.exact)),
-            yes_or_no(exact.unwrap_or(score.isomorphic)),
-            score.edge_f1,
-            100.0 * score.location
-        );
+        println!("against the true map: {}", drive.against_truth());
         for line in fault_lines(faults) {
             println!("fault {line}");
         }
@@ -135,6 +128,25 @@ impl<'a, const V: usize> Summary<'a, V> {
             path: exploration.path(),
             faults: exploration.faults(),
         }
+    }
+}
+
+impl<const V: usize> Summary<'_, V> {
+    /// How right the map is.
+    pub(super) fn against_truth(&self) -> String {
+        let Self { truth, ground_truth, map, darts, is_complete, path, .. } = self;
+        let nodes: Vec<Option<usize>> = ground_truth.detections().iter().map(|detection| detection.node).collect();
+        let score = score_path(map, path, truth, &nodes);
+        let exact = darts.map(|darts| has_driven_ways(darts, ground_truth));
+        format!(
+            "exact {}, isomorphic {}, complete {}, whole plan driven {}, edge F1 {:.2}, located in {:.0} % of the places",
+            yes_or_no(exact.unwrap_or(score.exact)),
+            yes_or_no(exact.unwrap_or(score.isomorphic)),
+            yes_or_no(*is_complete),
+            yes_or_no(is_whole(ground_truth)),
+            score.edge_f1,
+            100.0 * score.location
+        )
     }
 }
 

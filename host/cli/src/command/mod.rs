@@ -12,6 +12,7 @@ pub(crate) mod export;
 mod filter;
 pub(crate) mod fleet;
 mod hardship;
+mod hardware;
 mod interrupt;
 mod machine;
 #[cfg(not(all(feature = "mqtt", feature = "recording")))]

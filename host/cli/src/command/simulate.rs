@@ -6,16 +6,16 @@ use anyhow::Context;
 use clap::Args;
 use toposlam::Filter;
 use toposlam::persist::Persist;
-use toposlam::reference::{SONARS, ordered, paper, robust};
-use toposlam::robot::RobotConfig;
 use toposlam::wire::FilterSettings;
 use toposlam_cli::picture::{Drawing, Step, animate};
 use toposlam_cli::progress::Progress;
 use toposlam_sim::exploration::Exploration;
-use toposlam_sim::world::Detection;
+use toposlam_sim::hardware::Hardware;
+use toposlam_sim::world::{Detection, Plan, RobotModel};
 
 use super::drive::{DriveArguments, Summary};
 use super::filter::FilterArgument;
+use super::hardware::{HardwareArguments, for_filter_and_ring};
 use super::on_graph::{self, OnGraph};
 
 /// Arguments of `toposlam simulate`.
@@ -36,6 +36,8 @@ pub(crate) struct Arguments {
     #[arg(long, value_enum, default_value_t = FilterArgument::Ordered)]
     filter: FilterArgument,
     #[command(flatten)]
+    hardware: HardwareArguments,
+    #[command(flatten)]
     on_graph: OnGraph,
 }
 
@@ -44,32 +46,39 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     if on_graph.on_graph {
         return on_graph::run(drive, on_graph, *filter, *places, *frames);
     }
-    match filter {
-        FilterArgument::Ordered => explore::<{ ordered::VERTICES }, ordered::Filter>(
-            arguments,
-            &ordered::ROBOT,
-            &mut [0; ordered::SNAPSHOT_BYTES],
-        ),
-        FilterArgument::Robust => {
-            explore::<{ robust::VERTICES }, robust::Filter>(arguments, &robust::ROBOT, &mut [0; robust::SNAPSHOT_BYTES])
-        }
-        FilterArgument::Paper => {
-            explore::<{ paper::VERTICES }, paper::Filter>(arguments, &paper::ROBOT, &mut [0; paper::SNAPSHOT_BYTES])
-        }
+    let hardware = arguments.hardware.load()?;
+    let (plan, model) = drive.world_for(&hardware)?;
+    for_filter_and_ring!(filter, hardware.ring.sonars, explore(arguments, &plan, (&model, &hardware), false))?;
+    let reference = Hardware::reference();
+    if hardware != reference {
+        let (_, model) = drive.world_for(&reference)?;
+        for_filter_and_ring!(filter, reference.ring.sonars, explore(arguments, &plan, (&model, &reference), true))?;
     }
+    Ok(())
 }
 
-fn explore<const V: usize, F>(
+/// Explores until the last place. The reference robot, which is compared with another one, prints no more than how exact its map is.
+fn explore<const V: usize, F, const S: usize>(
     arguments: &Arguments,
-    config: &RobotConfig<SONARS, F::Config>,
+    plan: &Plan,
+    (model, hardware): (&RobotModel, &Hardware),
+    is_reference: bool,
+    filter: F::Config,
     buffer: &mut [u8],
 ) -> anyhow::Result<()>
 where
     F: Filter<V, Config: FilterSettings> + Persist,
 {
     let Arguments { drive, places, frames, animate: animation, .. } = arguments;
-    let (plan, model) = drive.world()?;
-    let mut exploration = Exploration::<V, F>::with_robot(&plan, model, drive.seed(), config, buffer)?;
+    let (config, body, seed) = (hardware.configured::<S, _>(filter), hardware.body.body, drive.seed());
+    let mut exploration = Exploration::<V, F, S>::with_body(plan, *model, body, seed, &config, buffer)?;
+    if is_reference {
+        while exploration.places() < *places && (*frames == 0 || exploration.frames() < *frames) {
+            exploration.advance();
+        }
+        println!("the reference robot: {}", Summary::of(plan, &exploration).against_truth());
+        return Ok(());
+    }
     let progress = Progress::new("", *places, "places");
     let (mut way, mut steps) = (Vec::new(), Vec::new());
     while exploration.places() < *places && (*frames == 0 || exploration.frames() < *frames) {
@@ -87,9 +96,9 @@ where
         }
     }
     drop(progress);
-    drive.summarise(&Summary::of(&plan, &exploration))?;
+    drive.summarise(&Summary::of(plan, &exploration))?;
     if let Some(file) = animation {
-        let picture = animate(&plan, &way, &steps);
+        let picture = animate(plan, &way, &steps);
         std::fs::write(file, picture).with_context(|| format!("writing {}", file.display()))?;
     }
     println!("{} ring frames, stopped by a wall in {}", exploration.frames(), exploration.rover().bumps());
@@ -97,7 +106,7 @@ where
 }
 
 /// The current map, with each vertex at the true node of the majority of its visits.
-fn map_now<const V: usize, F>(plan: &str, exploration: &Exploration<'_, V, F>, driven: usize) -> Step
+fn map_now<const V: usize, F, const S: usize>(plan: &str, exploration: &Exploration<'_, V, F, S>, driven: usize) -> Step
 where
     F: Filter<V, Config: FilterSettings> + Persist,
 {

@@ -37,7 +37,7 @@ mod walls;
 pub use ground_truth::{Detection, GroundTruth, Report};
 pub use hints::{HintReport, ReportedHints};
 pub use plan::{Plan, PlanError, PlanFileError};
-pub use ray_casting::{SONARS, SonarModel};
+pub use ray_casting::{SONARS, SONARS_MAX, SonarModel};
 pub use rover::{BodyModel, Rover};
 pub use simulation::{Pose, RobotModel, Simulation, Truth};
 pub use truth::{Dropped, Limits, TrueEdge, TrueMap, TrueNode, TrueWay, UnreachablePart};

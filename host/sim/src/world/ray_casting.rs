@@ -6,12 +6,14 @@ use rand::{Rng, RngExt};
 use rand_distr::{Distribution, StandardNormal};
 use toposlam::ring::{Echo, RingFrame};
 
-use super::Pose;
 use super::plan::Plan;
+use super::{Point, Pose};
 
 /// Number of sonars of the simulated ring of the reference robot: evenly spaced and counter-clockwise, the first straight ahead.
 pub const SONARS: usize = 16;
-/// Number of rays of a ring. Overlapping cones share their rays.
+/// Largest number of sonars of a simulated ring.
+pub const SONARS_MAX: usize = 24;
+/// Number of rays of an even ring. Overlapping cones share their rays.
 const RAYS: usize = 96;
 
 /// Cone, range and noise of the sonars.
@@ -33,7 +35,12 @@ pub struct SonarModel {
     /// Largest angle of incidence at which a wall returns an echo, in radians. Default 0.436 (25°).
     pub specular_limit_rad: f64,
     /// Sonars that never answer, one bit for each. Default none.
-    pub dead_sonars: u16,
+    pub dead_sonars: u32,
+    /// Distance of the sonars from the centre of the ring, along their bearings, in millimetres. Default 0. The ranges of a frame are
+    /// from the centre: drivers add it.
+    pub offset_mm: f64,
+    /// Bearings of the sonars, counter-clockwise from straight ahead, in radians. Default evenly spaced from straight ahead.
+    pub bearings_rad: Option<[f64; SONARS_MAX]>,
 }
 
 impl Default for SonarModel {
@@ -46,7 +53,38 @@ impl Default for SonarModel {
             missed_share: 0.02,
             specular_limit_rad: 25f64.to_radians(),
             dead_sonars: 0,
+            offset_mm: 0.0,
+            bearings_rad: None,
         }
+    }
+}
+
+/// Position and axis of a sensor.
+struct Sensor {
+    position: Point,
+    axis_rad: f64,
+    /// Cosine and sine of the axis.
+    direction: (f64, f64),
+}
+
+impl Sensor {
+    /// Distance of a point along the axis, in millimetres.
+    fn along_mm(&self, to: Point) -> f64 {
+        (to.x_mm - self.position.x_mm) * self.direction.0 + (to.y_mm - self.position.y_mm) * self.direction.1
+    }
+}
+
+impl SonarModel {
+    /// The sensors of a ring at a pose.
+    fn sensors<const SONARS: usize>(&self, pose: &Pose) -> [Sensor; SONARS] {
+        std::array::from_fn(|sonar| {
+            let even_rad = TAU * sonar as f64 / SONARS as f64;
+            let axis_rad = pose.heading_rad + self.bearings_rad.map_or(even_rad, |bearings_rad| bearings_rad[sonar]);
+            let (sine, cosine) = axis_rad.sin_cos();
+            let Point { x_mm, y_mm } = pose.position;
+            let position = Point::new(x_mm + cosine * self.offset_mm, y_mm + sine * self.offset_mm);
+            Sensor { position, axis_rad, direction: (cosine, sine) }
+        })
     }
 }
 
@@ -65,65 +103,96 @@ impl Scene {
         Self { plan: plan.clone() }
     }
 
-    /// Simulates one reading of a ring. `SONARS` divides the number of rays.
+    /// Simulates one reading of a ring of up to [`SONARS_MAX`] sonars.
     pub(super) fn frame<const SONARS: usize>(
         &self,
         pose: &Pose,
         model: &SonarModel,
         random: &mut impl Rng,
     ) -> RingFrame<SONARS> {
-        const { assert!(RAYS.is_multiple_of(SONARS) && SONARS <= 16, "the sonars are on rays and have a bit each") };
-        let mut heard_mm: [f64; SONARS] = self.walls(pose, model);
-        self.hear_corners(pose, model, &mut heard_mm);
+        const { assert!(SONARS <= SONARS_MAX, "each sonar has a bearing and a bit") };
+        let sensors = model.sensors::<SONARS>(pose);
+        let half_rays = model.cone_half_angle_rad / (TAU / RAYS as f64);
+        let is_even = model.bearings_rad.is_none() && model.offset_mm == 0.0 && RAYS.is_multiple_of(SONARS);
+        let mut heard_mm = if is_even && (half_rays - half_rays.round()).abs() < 1e-9 {
+            self.walls_around(pose, model, half_rays.round() as usize)
+        } else {
+            sensors.each_ref().map(|sensor| self.wall_in_cone(sensor, model))
+        };
+        self.hear_corners(pose, &sensors, model, &mut heard_mm);
         let mut echoes = [Echo::Dead; SONARS];
         for (sonar, (echo, heard_mm)) in echoes.iter_mut().zip(heard_mm).enumerate() {
             // Drawn for every sonar, so that a dead one does not change the readings of the others.
             let noise_mm: f64 = StandardNormal.sample(random);
             let missed = random.random_bool(model.missed_share);
             let range_mm = (heard_mm + noise_mm * model.range_sd_mm).max(model.range_min_mm);
+            let is_heard = !missed && range_mm <= model.range_max_mm;
             if model.dead_sonars >> sonar & 1 == 1 {
                 *echo = Echo::Dead;
-            } else if missed || range_mm > model.range_max_mm {
-                *echo = Echo::Silence;
+            } else if is_heard {
+                *echo = Echo::Range { range_mm: (range_mm + model.offset_mm).round() as u16 };
             } else {
-                *echo = Echo::Range { range_mm: range_mm.round() as u16 };
+                *echo = Echo::Silence;
             }
         }
         RingFrame { echoes }
     }
 
-    /// Range of the nearest wall that each sonar measures, in millimetres; infinite without an echo.
-    fn walls<const SONARS: usize>(&self, pose: &Pose, model: &SonarModel) -> [f64; SONARS] {
-        let spacing = TAU / RAYS as f64;
-        let least_cosine = model.specular_limit_rad.cos();
+    /// Range of the nearest wall that each sonar of an even ring measures, in millimetres; infinite without an echo. The cones are this
+    /// many rays wide on either side.
+    fn walls_around<const SONARS: usize>(&self, pose: &Pose, model: &SonarModel, half_rays: usize) -> [f64; SONARS] {
         let rays: [f64; RAYS] = std::array::from_fn(|ray| {
-            let direction = pose.heading_rad + ray as f64 * spacing;
-            let hit = self.plan.walls().cast(pose.position, direction, model.range_max_mm);
-            if hit.cosine_off_normal >= least_cosine { hit.range_mm } else { f64::INFINITY }
+            let direction = pose.heading_rad + ray as f64 * (TAU / RAYS as f64);
+            self.wall_along(pose.position, direction, model)
         });
-        let half = ((model.cone_half_angle_rad / spacing) as usize).min(RAYS / 2);
+        let half = half_rays.min(RAYS / 2);
         std::array::from_fn(|sonar| {
             let first = sonar * (RAYS / SONARS) + RAYS - half;
             (first..=first + 2 * half).map(|ray| rays[ray % RAYS]).fold(f64::INFINITY, f64::min)
         })
     }
 
+    /// Range of the nearest wall in one cone, in millimetres; infinite without an echo.
+    fn wall_in_cone(&self, sensor: &Sensor, model: &SonarModel) -> f64 {
+        let half_rays = (model.cone_half_angle_rad / (TAU / RAYS as f64)).ceil().max(1.0);
+        let step_rad = model.cone_half_angle_rad / half_rays;
+        let rays = -(half_rays as i32)..=half_rays as i32;
+        let direction_rad = |ray: i32| sensor.axis_rad + f64::from(ray) * step_rad;
+        let ranges_mm = rays.map(|ray| self.wall_along(sensor.position, direction_rad(ray), model));
+        ranges_mm.fold(f64::INFINITY, f64::min)
+    }
+
+    /// Range of the wall along a ray, in millimetres; infinite without an echo.
+    fn wall_along(&self, from: Point, direction_rad: f64, model: &SonarModel) -> f64 {
+        let hit = self.plan.walls().cast(from, direction_rad, model.range_max_mm);
+        if hit.cosine_off_normal >= model.specular_limit_rad.cos() { hit.range_mm } else { f64::INFINITY }
+    }
+
     /// Adds the echoes of the visible corners in each cone.
-    fn hear_corners<const SONARS: usize>(&self, pose: &Pose, model: &SonarModel, heard_mm: &mut [f64; SONARS]) {
-        for corner in self.plan.walls().corners_near(pose.position, model.range_max_mm) {
-            let range_mm = pose.position.distance_mm(corner);
-            if range_mm > model.range_max_mm {
+    fn hear_corners<const SONARS: usize>(
+        &self,
+        pose: &Pose,
+        sensors: &[Sensor; SONARS],
+        model: &SonarModel,
+        heard_mm: &mut [f64; SONARS],
+    ) {
+        let walls = self.plan.walls();
+        let reach_mm = model.range_max_mm + model.offset_mm;
+        let least_cosine = model.cone_half_angle_rad.cos();
+        for corner in walls.corners_near(pose.position, reach_mm) {
+            let from_centre_mm = pose.position.distance_mm(corner);
+            if from_centre_mm > reach_mm {
                 continue;
             }
-            let direction = pose.position.direction_to(corner);
-            let mut in_sight = None;
-            for (sonar, heard_mm) in heard_mm.iter_mut().enumerate() {
-                let axis = pose.heading_rad + TAU * sonar as f64 / SONARS as f64;
-                if range_mm < *heard_mm && wrapped(direction - axis).abs() <= model.cone_half_angle_rad {
-                    let in_sight = in_sight.get_or_insert_with(|| self.plan.walls().is_in_sight(pose.position, corner));
-                    if *in_sight {
-                        *heard_mm = range_mm;
-                    }
+            for (sensor, heard_mm) in sensors.iter().zip(&mut *heard_mm) {
+                let is_central = model.offset_mm == 0.0;
+                let range_mm = if is_central { from_centre_mm } else { sensor.position.distance_mm(corner) };
+                let is_nearer = range_mm < *heard_mm && range_mm <= model.range_max_mm;
+                if is_nearer
+                    && sensor.along_mm(corner) >= least_cosine * range_mm
+                    && walls.is_in_sight(sensor.position, corner)
+                {
+                    *heard_mm = range_mm;
                 }
             }
         }
@@ -133,7 +202,6 @@ impl Scene {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::world::Point;
     use rand::SeedableRng;
     use rand_xoshiro::Xoshiro256PlusPlus;
 
@@ -159,6 +227,17 @@ mod tests {
         let heard = frame.echoes.map(|echo| echo.range_mm().unwrap_or(0));
         assert_eq!((heard[0], heard[4], heard[8], heard[12]), (1000, 1000, 3000, 1000));
         assert_eq!((heard[2], heard[14]), (1414, 1414));
+        // The same from sensors on a circle of 120 mm, and with a sensor ahead that looks to the left.
+        let outside = SonarModel { offset_mm: 120.0, ..perfect };
+        let frame: RingFrame<SONARS> = closet().frame(&pose, &outside, &mut random);
+        let heard = frame.echoes.map(|echo| echo.range_mm().unwrap_or(0));
+        assert_eq!((heard[0], heard[4], heard[8], heard[12]), (1000, 1000, 3000, 1000));
+        let mut bearings_rad = [0.0; SONARS_MAX];
+        (bearings_rad[0], bearings_rad[1]) = (PI / 2.0, PI);
+        let turned = SonarModel { bearings_rad: Some(bearings_rad), ..perfect };
+        let frame: RingFrame<5> = closet().frame(&pose, &turned, &mut random);
+        let heard = frame.echoes.map(|echo| echo.range_mm().unwrap_or(0));
+        assert_eq!(heard, [1000, 3000, 1000, 1000, 1000]);
         let dead = SonarModel { dead_sonars: 1 << 4, ..perfect };
         assert_eq!(closet().frame::<SONARS>(&pose, &dead, &mut random).echoes[4], Echo::Dead);
         let missed = SonarModel { missed_share: 1.0, ..perfect };

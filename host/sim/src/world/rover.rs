@@ -84,7 +84,7 @@ impl Rover {
         self.bumps
     }
 
-    /// Reads the ring of 4, 8 or 16 sonars once and returns the ground truth of that frame.
+    /// Reads the ring of up to 24 sonars once and returns the ground truth of that frame.
     pub fn frame<const SONARS: usize>(&mut self) -> (RingFrame<SONARS>, Truth) {
         let frame = self.scene.frame(&self.pose, &self.model.sonar, &mut self.random);
         let node = self.map.nearest_node(self.pose.position).filter(|(_, distance_mm)| *distance_mm <= AT_NODE_MM);
