@@ -65,8 +65,9 @@ fn with_a_tenth_of_the_echoes_missed_the_exits_are_right() {
 #[test]
 fn walls_detected_at_a_flat_angle_are_not_places() {
     let sonar = SonarModel { specular_limit_rad: 35_f64.to_radians(), ..SonarModel::default() };
-    let Outcome { report, .. } = explore("office", sonar, 0, 100);
-    assert!(report.phantom + report.doubled <= 1, "{report}");
+    let reports = [1, 2, 3].map(|seed| explore("office", sonar, seed, 100).report);
+    let wrong: usize = reports.iter().map(|report| report.phantom + report.doubled).sum();
+    assert!(wrong <= 3, "{reports:?}");
 }
 
 /// Two rooms beside a corridor of 1.6 m, joined by gaps of `gap_mm` in a wall of `thickness_mm`; cells of 50 mm.

@@ -13,6 +13,8 @@ use crate::top_k::TopK;
 
 /// An opening is matched to the one of the frame before when its bearing changed by at most this, in milliradians.
 const SAME_OPENING_MRAD: u16 = 700;
+/// The same in a frame that shows another number of openings.
+const DOUBTFUL_OPENING_MRAD: u16 = 350;
 /// The robot faces an exit within this angle of straight ahead, in milliradians. Sensors within it look ahead.
 const FACING_MRAD: i32 = 200;
 /// Where all sensors within [`FACING_MRAD`] are dead, sensors within this angle replace them, in milliradians.
@@ -95,8 +97,8 @@ pub(super) struct LocalPlanner {
     target_mrad: i16,
     /// Change of all bearings since the frame before.
     rotation_mrad: i32,
-    /// The same for each frame of a turn to an exit, smoothed.
-    turn_rate_mrad: i32,
+    /// The number of openings when the exit was chosen.
+    openings: u8,
     /// The degree of the place by the detector.
     degree: Option<u8>,
     departure: Departure,
@@ -117,7 +119,7 @@ impl LocalPlanner {
             entry_mrad: 0,
             target_mrad: 0,
             rotation_mrad: 0,
-            turn_rate_mrad: 0,
+            openings: 0,
             degree: None,
             departure: Departure::UNKNOWN,
             is_returning: false,
@@ -266,7 +268,8 @@ impl LocalPlanner {
         is_at_place: bool,
     ) -> VelocityCommand {
         if !is_at_place && obstacles.spread_mm().is_some_and(|spread_mm| spread_mm <= scan.equidistance_mm()) {
-            self.entry_mrad = HALF_TURN_MRAD;
+            // The rotation of this frame is applied to it as to that of any other.
+            self.entry_mrad = rotated(HALF_TURN_MRAD, -self.rotation_mrad);
             self.enter(DriveState::Approach);
             return self.approach(scan, obstacles);
         }
@@ -332,7 +335,7 @@ impl LocalPlanner {
         };
         self.departure = Departure { is_known: true, exit_mrad, driven_permille: 0 };
         self.target_mrad = rotated(self.entry_mrad, exit_mrad.into());
-        self.turn_rate_mrad = 0;
+        self.openings = count as u8;
         self.enter(DriveState::TurnToExit);
         self.turn_to_exit(scan, obstacles)
     }
@@ -345,14 +348,17 @@ impl LocalPlanner {
         if self.is_timed_out() {
             return self.give_up(scan);
         }
-        // An exit that this frame does not show is where the rotation of the ring brings it. The robot turns towards the exit.
-        self.turn_rate_mrad += (self.rotation_mrad - self.turn_rate_mrad) / 4;
-        let towards_mrad = if self.target_mrad < 0 { self.turn_rate_mrad.max(0) } else { self.turn_rate_mrad.min(0) };
-        let expected_mrad = rotated(self.target_mrad, towards_mrad);
+        // An exit that this frame does not show is where the rotation of the ring brings it. While the robot turns, the ring misses
+        // openings and merges them: a frame that shows another number of them is trusted less.
+        let expected_mrad = rotated(self.target_mrad, self.rotation_mrad);
         let openings = scan.openings(obstacles);
         // A dead end has no other opening.
         let is_dead_end = self.degree == Some(1) && openings.count() == 1;
-        let within_mrad = if is_dead_end { HALF_TURN_MRAD as u16 } else { SAME_OPENING_MRAD };
+        let within_mrad = match openings.count() {
+            1 if is_dead_end => HALF_TURN_MRAD as u16,
+            count if count == self.openings => SAME_OPENING_MRAD,
+            _ => DOUBTFUL_OPENING_MRAD,
+        };
         let seen = openings.nearest(expected_mrad, within_mrad);
         let target_mrad = seen.map_or(expected_mrad, |(_, target_mrad)| target_mrad);
         // Straight behind, noise must not reverse the direction of the turn.

@@ -181,7 +181,7 @@ impl<const SONARS: usize> PlaceDetector<SONARS> {
             return None;
         }
         let obstacles = self.scan().obstacles();
-        self.rotation.update(&obstacles);
+        self.rotation.update(&self.smooth_mm, &self.geometry);
         self.turned_mrad = rotated(self.turned_mrad, self.rotation.rotation_mrad());
         let meet_point = self.scan().meet_point(&obstacles);
         if self.is_at_place {

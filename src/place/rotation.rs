@@ -1,77 +1,138 @@
-//! Estimates the rotation of the ring from frame to frame by the bearings of its obstacles: the robot has no odometry.
+//! Estimates the rotation of the ring from frame to frame by the bearings at which it measures near obstacles: the robot has no odometry.
 
-use super::Obstacles;
-use crate::bearing::{rotated, turn_mrad};
-use crate::top_k::TopK;
+use super::smoothing::{DEAD_MM, SILENT_MM};
+use crate::ring::RingGeometry;
 
-/// Bound of the rotation in one frame, and of the distance between the expected and the measured bearing of an obstacle, in
-/// milliradians.
-const MAX_ROTATION_MRAD: i16 = 700;
+/// The bearings at which frames are compared; a power of two.
+const BINS: usize = 32;
+/// The binary angle of one of them: 2¹⁶ is a full turn.
+const BIN: i32 = 1 << 16 >> BINS.trailing_zeros();
+/// A frame is compared with the reference at the expected rotation and at as many bins to either side of it.
+const SEARCHED: i32 = 3;
+/// A frame that differs from the reference by more than one part in this many becomes the reference.
+const DIFFERENT: u32 = 4;
+/// The price of a bin off the expected rotation, as a part of the sum of both profiles.
+const UNEXPECTED: u32 = 256;
+/// The nearest range that is distinguished, in millimetres.
+const NEAREST_MM: u16 = 200;
+/// The proximity of an obstacle is this divided by its range in millimetres.
+const PROXIMITY: i32 = 1 << 20;
 
-/// The bearings of the obstacles in the newest frame, and the rotation since the frame before.
+/// The proximity of the obstacles at evenly spaced bearings.
+type Profile = [u16; BINS];
+
+/// The rotation since a reference frame, by the best agreement of the proximity profiles of both frames.
+///
+/// A frame is compared with the reference, not with the frame before, so the errors of a turn in place do not add up. The robot drives
+/// away from a reference; a frame that no rotation explains is the next one.
 #[derive(Clone, Debug)]
 pub(super) struct RotationEstimate {
-    obstacles_mrad: [i16; Obstacles::MAX],
-    len: u8,
-    rotation_mrad: i16,
+    reference: Profile,
+    has_reference: bool,
+    /// The rotation of all bearings since the reference, as a binary angle.
+    turned: i16,
+    /// That of the newest frame.
+    step: i16,
+    /// That of the last frames, smoothed, which is expected of the next one.
+    rate: i16,
 }
 
 impl RotationEstimate {
     pub(super) const fn new() -> Self {
-        Self { obstacles_mrad: [0; Obstacles::MAX], len: 0, rotation_mrad: 0 }
+        Self { reference: [0; BINS], has_reference: false, turned: 0, step: 0, rate: 0 }
     }
 
     /// Change of all bearings between the last two frames, counter-clockwise positive: the negative of the robot's rotation.
     pub(super) fn rotation_mrad(&self) -> i32 {
-        self.rotation_mrad.into()
+        (i32::from(self.step) * 6283 + (1 << 15)) >> 16
     }
 
-    /// Updates the estimate with the obstacles of the next frame.
+    /// Updates the estimate with the next frame. A frame without echoes continues the rotation.
     ///
-    /// Each obstacle of the frame before is matched to the nearest one of this frame, under the previous rotation. The
-    /// median of the residuals corrects the rotation. Without a match the rotation stays as it is.
-    ///
-    /// Time O(1): at most six obstacles against six.
-    pub(super) fn update(&mut self, obstacles: &Obstacles) {
-        let mut residuals_mrad = TopK::<i16, { Obstacles::MAX }>::new(0);
-        for &before_mrad in self.obstacles_mrad.iter().take(self.len.into()) {
-            let expected_mrad = rotated(before_mrad, self.rotation_mrad());
-            let all_mrad = obstacles.iter().map(|obstacle| turn_mrad(expected_mrad, obstacle.bearing_mrad));
-            let nearest_mrad = all_mrad.min_by_key(|residual_mrad| residual_mrad.abs());
-            let nearest_mrad = nearest_mrad.filter(|residual_mrad| residual_mrad.abs() < MAX_ROTATION_MRAD.into());
-            if let Some(residual_mrad) = nearest_mrad {
-                residuals_mrad.insert(residual_mrad as i16, |one, other| one <= other);
-            }
+    /// Time O(SONARS): nine comparisons of profiles of 32 bearings.
+    pub(super) fn update<const SONARS: usize>(&mut self, ranges_mm: &[u16; SONARS], geometry: &RingGeometry<SONARS>) {
+        let now = proximity_profile(ranges_mm, geometry);
+        if now.iter().all(|&proximity| proximity == 0) {
+            self.step = self.rate;
+            self.turned = self.turned.wrapping_add(self.step);
+            return;
         }
-        let sorted_mrad = residuals_mrad.as_slice();
-        let last = sorted_mrad.len().saturating_sub(1);
-        let median_mrad = sorted_mrad.get(last / 2).copied().unwrap_or(0);
-        self.rotation_mrad =
-            self.rotation_mrad.saturating_add(median_mrad).clamp(-MAX_ROTATION_MRAD, MAX_ROTATION_MRAD);
-        self.len = 0;
-        for (slot, obstacle) in self.obstacles_mrad.iter_mut().zip(obstacles.iter()) {
-            *slot = obstacle.bearing_mrad;
-            self.len += 1;
+        if !self.has_reference {
+            self.refer_to(&now);
+            return;
+        }
+        let expected = self.turned.wrapping_add(self.rate);
+        let centre = (i32::from(expected) + BIN / 2).div_euclid(BIN);
+        let sum: u32 = now.iter().chain(&self.reference).map(|&proximity| u32::from(proximity)).sum();
+        let price = |bins: i32| difference(&self.reference, &now, bins) + sum / UNEXPECTED * bins.abs_diff(centre);
+        let here = (i32::from(self.turned) + BIN / 2).div_euclid(BIN);
+        let best = (here - SEARCHED..=here + SEARCHED).min_by_key(|&bins| price(bins)).unwrap_or(here);
+        let [before, at, after] = [best - 1, best, best + 1].map(|bins| difference(&self.reference, &now, bins));
+        // The difference grows linearly to both sides of its minimum.
+        let part = BIN / 2 * (before as i32 - after as i32);
+        let part = part.checked_div(before.max(after) as i32 - at as i32).unwrap_or(0).clamp(-BIN / 2, BIN / 2);
+        let turned = (best * BIN + part) as i16;
+        self.step = turned.wrapping_sub(self.turned);
+        self.turned = turned;
+        self.rate = self.rate / 2 + self.step / 2;
+        if at > sum / DIFFERENT {
+            self.refer_to(&now);
         }
     }
+
+    fn refer_to(&mut self, now: &Profile) {
+        self.reference = *now;
+        self.has_reference = true;
+        self.turned = 0;
+    }
+}
+
+/// By how much a profile differs from another one that is rotated by `bins`.
+fn difference(reference: &Profile, now: &Profile, bins: i32) -> u32 {
+    let mut sum = 0;
+    for (bearing, &proximity) in (0_i32..).zip(now) {
+        let before = bearing.wrapping_sub(bins) as usize % BINS;
+        sum += u32::from(reference.get(before).copied().unwrap_or(0).abs_diff(proximity));
+    }
+    sum
+}
+
+/// The proximity at 32 bearings from straight behind, interpolated between the live sensors beside each. Ranges and bearings are in
+/// ascending order of bearing.
+fn proximity_profile<const SONARS: usize>(ranges_mm: &[u16; SONARS], geometry: &RingGeometry<SONARS>) -> Profile {
+    let mut profile = [0; BINS];
+    let live = ranges_mm.iter().zip(&geometry.bearings_mrad).filter(|&(&range_mm, _)| range_mm != DEAD_MM);
+    let live = live.map(|(&range_mm, &bearing_mrad)| {
+        let proximity = if range_mm == SILENT_MM { 0 } else { PROXIMITY / i32::from(range_mm.max(NEAREST_MM)) };
+        ((i32::from(bearing_mrad) + 3142) * 65_536 / 6283, proximity)
+    });
+    let Some((last, last_proximity)) = live.clone().next_back() else { return profile };
+    let (mut from, mut from_proximity) = (last - 65_536, last_proximity);
+    for (to, to_proximity) in live {
+        let mut bin = (from + BIN - 1).div_euclid(BIN);
+        while bin * BIN < to {
+            let step = (to_proximity - from_proximity) * (bin * BIN - from) / (to - from).max(1);
+            if let Some(slot) = profile.get_mut(bin as usize % BINS) {
+                *slot = (from_proximity + step) as u16;
+            }
+            bin += 1;
+        }
+        (from, from_proximity) = (to, to_proximity);
+    }
+    profile
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::place::{PlaceConfig, PlaceDetector};
-    use crate::ring::{Echo, RingFrame, RingGeometry};
 
     /// Updates the estimate with a frame of a ring of 16 in which these sensors measure 800 mm, and returns it.
     fn update(estimate: &mut RotationEstimate, sensors: &[usize]) -> i32 {
-        let mut frame = RingFrame { echoes: [Echo::Silence; 16] };
-        for &sensor in sensors {
-            frame.echoes[sensor] = Echo::Range { range_mm: 800 };
-        }
-        let mut detector = PlaceDetector::new();
-        detector.start(PlaceConfig::DEFAULT, RingGeometry::even()).unwrap();
-        detector.observe(&frame);
-        estimate.update(&detector.scan().obstacles());
+        let mut ranges_mm = [SILENT_MM; 16];
+        sensors.iter().for_each(|&sensor| ranges_mm[sensor] = 800);
+        let mut geometry = RingGeometry::even();
+        geometry.bearings_mrad.sort_unstable();
+        estimate.update(&ranges_mm, &geometry);
         estimate.rotation_mrad()
     }
 
@@ -79,27 +140,51 @@ mod tests {
     fn a_rotation_by_one_sensor_a_frame_is_estimated_although_some_sensors_measure_the_same() {
         let mut estimate = RotationEstimate::new();
         update(&mut estimate, &[0, 4, 8]);
-        for frame in 1..8 {
-            let sensors = [0, 4, 8].map(|sensor| (sensor + 16 - frame) % 16);
-            assert!((update(&mut estimate, &sensors) + 393).abs() <= 2, "frame {frame}");
+        for frame in 1..40 {
+            let sensors = [0, 4, 8].map(|sensor| (sensor + 48 - frame) % 16);
+            assert!((update(&mut estimate, &sensors) + 393).abs() <= 3, "frame {frame} {}", estimate.rotation_mrad());
         }
+    }
+
+    #[test]
+    fn the_errors_of_a_turn_in_place_do_not_add_up() {
+        // Three turns by a third of a sensor in each frame: the frames show only whole sensors.
+        let mut estimate = RotationEstimate::new();
+        let mut turned_mrad = 0;
+        for frame in 0..145 {
+            turned_mrad += update(&mut estimate, &[0, 3, 4, 9].map(|sensor| (sensor + (frame + 1) / 3) % 16));
+        }
+        assert!((turned_mrad - 3 * 6283).abs() < 20, "{turned_mrad}");
     }
 
     #[test]
     fn an_obstacle_that_disappears_or_appears_does_not_change_the_estimate() {
         let mut estimate = RotationEstimate::new();
         update(&mut estimate, &[0, 4, 8]);
-        assert!((update(&mut estimate, &[7, 15]) + 393).abs() <= 2);
-        assert!((update(&mut estimate, &[2, 6, 14]) + 393).abs() <= 2);
+        assert!((update(&mut estimate, &[7, 15]) + 393).abs() <= 40, "{}", estimate.rotation_mrad());
+        assert!((update(&mut estimate, &[2, 6, 14]) + 393).abs() <= 40, "{}", estimate.rotation_mrad());
+    }
+
+    #[test]
+    fn where_no_rotation_explains_a_frame_the_next_ones_are_compared_with_it() {
+        let mut estimate = RotationEstimate::new();
+        update(&mut estimate, &[0, 4, 8]);
+        update(&mut estimate, &[1, 2, 6, 7, 11, 12]);
+        assert!((update(&mut estimate, &[2, 3, 7, 8, 12, 13]) - 393).abs() <= 40, "{}", estimate.rotation_mrad());
+        for _ in 0..4 {
+            update(&mut estimate, &[2, 3, 7, 8, 12, 13]);
+        }
+        assert_eq!(estimate.rotation_mrad(), 0, "the rotation stops when the obstacles do");
     }
 
     #[test]
     fn without_obstacles_the_rotation_continues() {
         let mut estimate = RotationEstimate::new();
-        update(&mut estimate, &[0, 4, 8]);
-        update(&mut estimate, &[1, 5, 9]);
-        assert!((update(&mut estimate, &[]) - 393).abs() <= 2);
-        assert!((update(&mut estimate, &[3, 7, 11]) - 393).abs() <= 2);
-        assert!(update(&mut estimate, &[3, 7, 11]).abs() <= 2, "the rotation stops when the obstacles do");
+        for frame in 0..6 {
+            update(&mut estimate, &[0, 4, 8].map(|sensor| (sensor + frame) % 16));
+        }
+        assert!((update(&mut estimate, &[]) - 393).abs() <= 20, "{}", estimate.rotation_mrad());
+        assert!((update(&mut estimate, &[7, 11, 15]) - 393).abs() <= 20, "{}", estimate.rotation_mrad());
+        assert!(update(&mut estimate, &[7, 11, 15]).abs() <= 2, "the rotation stops when the obstacles do");
     }
 }
