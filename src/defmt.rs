@@ -45,6 +45,7 @@ texts!(FaultKind {
     DriveLost => "DriveLost",
     LoopLate => "LoopLate",
     InvalidHint => "InvalidHint",
+    SonarImplausible => "SonarImplausible",
 });
 
 texts!(SonarFault {

@@ -49,11 +49,14 @@ pub enum FaultKind {
     LoopLate = 15,
     /// A hint of an observation is invalid, or contradicts the ways seen at the place before; it was ignored.
     InvalidHint = 16,
+    /// The ranges of a sonar cannot be true while the ring turns: it is stuck at one range, or measures a short one where its neighbours do
+    /// not. It is left out until its ranges are plausible again.
+    SonarImplausible = 17,
 }
 
 impl FaultKind {
     /// All kinds, in the order of their numbers.
-    pub const ALL: [Self; 17] = [
+    pub const ALL: [Self; 18] = [
         Self::SonarSilent,
         Self::SonarOutOfRange,
         Self::BusError,
@@ -71,6 +74,7 @@ impl FaultKind {
         Self::DriveLost,
         Self::LoopLate,
         Self::InvalidHint,
+        Self::SonarImplausible,
     ];
 }
 

@@ -1,9 +1,12 @@
 //! Exploration of the simulated world: completeness, and with faulty sonars collisions, places found and hints.
 
+use toposlam::FaultKind;
 use toposlam::reference::{SNAPSHOT_BYTES, robust};
+use toposlam::ring::Echo;
 use toposlam::wire::Command;
 use toposlam_eval::mapping::score_exploration;
 use toposlam_sim::exploration::Exploration;
+use toposlam_sim::injector::FaultRates;
 use toposlam_sim::world::{HintReport, Plan, Report, ReportedHints, RobotModel, SonarModel};
 
 /// The result of an exploration.
@@ -106,6 +109,79 @@ fn a_robot_does_not_touch_the_walls_of_gaps_and_does_not_enter_those_narrower_th
     assert!(u64::from(touched) * 1000 <= frames, "{touched} of {frames} frames at a wall");
 }
 
+/// A hall of this size in cells of 100 mm, with corridors of `width` cells to the west and to the east at these rows.
+fn hall([columns, rows]: [usize; 2], west: usize, east: usize, width: usize) -> Plan {
+    const CORRIDOR: usize = 40;
+    let mut cells = vec![vec![b'#'; columns + 2 * CORRIDOR + 2]; rows + 2];
+    cells[1..=rows].iter_mut().for_each(|row| row[CORRIDOR + 1..=CORRIDOR + columns].fill(b'.'));
+    cells[west..west + width].iter_mut().for_each(|row| row[1..=CORRIDOR].fill(b'.'));
+    cells[east..east + width]
+        .iter_mut()
+        .for_each(|row| row[CORRIDOR + columns + 1..=2 * CORRIDOR + columns].fill(b'.'));
+    cells[west + width / 2][CORRIDOR / 2] = b'S';
+    let cells: Vec<String> = cells.into_iter().map(|row| String::from_utf8(row).unwrap()).collect();
+    Plan::parse(&format!("cell_mm 100\n{}\n", cells.join("\n"))).unwrap()
+}
+
+#[test]
+fn a_hall_wider_than_the_sonars_reach_is_crossed_from_corridor_to_corridor() {
+    for (seed, size, west, east, width) in
+        [(1, [140, 140], 60, 60, 20), (2, [150, 130], 25, 90, 18), (3, [160, 150], 110, 40, 22)]
+    {
+        let plan = hall(size, west, east, width);
+        let mut buffer = [0; SNAPSHOT_BYTES];
+        let mut exploration = Exploration::start(&plan, RobotModel::default(), seed, &mut buffer).unwrap();
+        let mut crossings = 0;
+        let mut is_east = false;
+        while crossings < 4 {
+            assert!(exploration.frames() < 20_000, "{size:?}: {crossings} crossings");
+            exploration.advance();
+            let x_mm = exploration.rover().position().x_mm;
+            let is_far = if is_east { x_mm < 3500.0 } else { x_mm > 100.0 * (size[0] + 46) as f64 };
+            (is_east, crossings) = (is_east != is_far, crossings + u32::from(is_far));
+        }
+        assert!(exploration.times_lost() <= 2 * crossings, "{size:?}: lost {} times", exploration.times_lost());
+        assert_eq!(exploration.rover().bumps(), 0, "{size:?}");
+    }
+}
+
+#[test]
+fn with_a_tenth_of_the_answers_lost_and_false_ranges_the_exits_are_right() {
+    let plan = Plan::built_in("office").unwrap();
+    let mut buffer = [0; SNAPSHOT_BYTES];
+    let mut exploration = Exploration::start(&plan, RobotModel::default(), 1, &mut buffer).unwrap();
+    exploration.set_faults(FaultRates { answer_lost: 0.1, range_corrupted: 0.025, ..FaultRates::NONE }, 1);
+    while exploration.places() < 100 {
+        assert!(exploration.frames() < 100_000, "after {} places", exploration.places());
+        exploration.advance();
+    }
+    let reported: Vec<ReportedHints> = exploration.steps().iter().map(|step| step.reported).collect();
+    let (reported, wrong, _) = exploration.ground_truth().hint_report(&reported).exits;
+    assert!(reported > 80 && wrong <= 2, "{reported} exits reported, {wrong} wrong");
+    let report = exploration.ground_truth().report();
+    assert!(report.missed + report.phantom + report.doubled <= 2, "{report}");
+}
+
+#[test]
+fn a_sonar_stuck_at_one_range_is_left_out_and_the_robot_finds_its_places() {
+    for (sonar, range_mm) in [(3, 350), (12, 1400)] {
+        let plan = Plan::built_in("office").unwrap();
+        let mut buffer = [0; SNAPSHOT_BYTES];
+        let mut exploration = Exploration::start(&plan, RobotModel::default(), 1, &mut buffer).unwrap();
+        while exploration.places() < 60 {
+            assert!(exploration.frames() < 60_000, "after {} places", exploration.places());
+            let mut frame = exploration.frame();
+            frame.echoes[sonar] = Echo::Range { range_mm };
+            exploration.map(&frame);
+            let velocity = exploration.board().velocity;
+            exploration.drive(velocity);
+        }
+        assert!(exploration.faults().count(FaultKind::SonarImplausible) >= 1, "sonar {sonar} at {range_mm} mm");
+        let report = exploration.ground_truth().report();
+        assert!(report.found >= 50 && report.missed + report.phantom <= 8, "{report}");
+    }
+}
+
 #[test]
 fn exits_ways_and_travel_times_are_right() {
     let Outcome { hints, .. } = explore("ladder", SonarModel::default(), 2, 60);
@@ -139,7 +215,7 @@ fn a_robot_without_ways_explores_at_random_and_has_no_path_to_a_vertex() {
 fn a_map_is_complete_when_every_way_was_driven_and_the_robot_goes_on() {
     let plan = Plan::built_in("office").unwrap();
     let mut buffer = [0; SNAPSHOT_BYTES];
-    let mut exploration = Exploration::start(&plan, RobotModel::default(), 3, &mut buffer).unwrap();
+    let mut exploration = Exploration::start(&plan, RobotModel::default(), 1, &mut buffer).unwrap();
     let edges = exploration.rover().true_map().edges.len();
     while !exploration.robot().drive().is_complete() {
         exploration.advance();

@@ -1,6 +1,7 @@
 //! Drives from one place to the next: along an edge, to the meet point, and out by the chosen exit.
 
 use super::body::{Body, widest_room_mrad};
+use super::hall::Hall;
 use super::voronoi::{Sector, edge_heading_mrad, meet_point_offset_mm};
 use super::{DriveConfig, VelocityCommand};
 use crate::bearing::{HALF_TURN_MRAD, counter_clockwise_mrad, rotated, turn_mrad};
@@ -19,6 +20,11 @@ const DOUBTFUL_OPENING_MRAD: u16 = 350;
 const FACING_MRAD: i32 = 200;
 /// Where all sensors within [`FACING_MRAD`] are dead, sensors within this angle replace them, in milliradians.
 const FACING_BESIDE_DEAD_MRAD: i32 = 600;
+/// Limit of the heading of a turn in place, in milliradians: with the default wheels the ring turns by 72 mrad per frame, so that the
+/// smoothed ranges of a sensor are from one direction.
+const TURN_MRAD: i16 = 300;
+/// An exit whose bearing relative to the way by which the robot came differs by more than this after the turn is unknown, in milliradians.
+const SAME_EXIT_MRAD: i32 = 500;
 /// On the way out an exit is searched within this angle of where it was, in milliradians,
 const EXIT_MRAD: u16 = 500;
 /// and the robot does not steer off its bearing by more than this.
@@ -105,6 +111,7 @@ pub(super) struct LocalPlanner {
     /// Whether the robot turned back on its way to the next place.
     is_returning: bool,
     body: Body,
+    hall: Hall,
     /// The speed of the last velocity command.
     speed_permille: u16,
     faults: FaultCounters,
@@ -124,6 +131,7 @@ impl LocalPlanner {
             departure: Departure::UNKNOWN,
             is_returning: false,
             body: Body::new(),
+            hall: Hall::new(),
             speed_permille: 0,
             faults: FaultCounters::new(),
         }
@@ -253,6 +261,7 @@ impl LocalPlanner {
         self.state = state;
         self.frames = 0;
         if !matches!(state, DriveState::FollowEdge | DriveState::Depart | DriveState::Approach) {
+            self.hall.leave();
             self.body.forget_motion();
         }
     }
@@ -276,6 +285,9 @@ impl LocalPlanner {
         // A robot that a wall holds measures the same ranges as one on a very long edge.
         if self.frames > self.config.timeout_frames.saturating_mul(EDGE_TIMEOUTS) {
             return self.give_up(scan);
+        }
+        if let Some(heading_mrad) = self.hall.heading_mrad(scan) {
+            return VelocityCommand { heading_mrad, speed_permille: self.config.speed_permille };
         }
         self.drive(scan, Sector::EDGE, obstacles.spread_mm(), None)
     }
@@ -352,6 +364,7 @@ impl LocalPlanner {
         // openings and merges them: a frame that shows another number of them is trusted less.
         let expected_mrad = rotated(self.target_mrad, self.rotation_mrad);
         let openings = scan.openings(obstacles);
+        self.track_entry(&openings);
         // A dead end has no other opening.
         let is_dead_end = self.degree == Some(1) && openings.count() == 1;
         let within_mrad = match openings.count() {
@@ -371,10 +384,16 @@ impl LocalPlanner {
         let facing_mrad = facing_mrad(scan);
         let is_certain = seen.is_some() || facing_mrad > FACING_MRAD;
         if is_certain && i32::from(self.target_mrad).abs() <= facing_mrad {
+            // The way by which the robot came and the exit are tracked separately. When they do not agree, one of them is another opening.
+            let exit_mrad = counter_clockwise_mrad(self.entry_mrad, self.target_mrad);
+            let off_mrad = exit_mrad.abs_diff(self.departure.exit_mrad.into()) as i32;
+            if off_mrad.min(2 * i32::from(HALF_TURN_MRAD) - off_mrad) > SAME_EXIT_MRAD {
+                self.departure.is_known = false;
+            }
             self.enter(DriveState::Depart);
             return self.drive(scan, Sector::EXIT, None, seen.map(|_| self.target_mrad));
         }
-        VelocityCommand { heading_mrad: self.target_mrad, speed_permille: 0 }
+        VelocityCommand { heading_mrad: self.target_mrad.clamp(-TURN_MRAD, TURN_MRAD), speed_permille: 0 }
     }
 
     fn depart<const SONARS: usize>(
@@ -404,7 +423,7 @@ impl LocalPlanner {
         if is_free && faces && self.body.is_free() || self.is_timed_out() {
             self.enter(DriveState::FollowEdge);
         }
-        VelocityCommand { heading_mrad: if self.target_mrad < 0 { -1571 } else { 1571 }, speed_permille: 0 }
+        VelocityCommand { heading_mrad: if self.target_mrad < 0 { -TURN_MRAD } else { TURN_MRAD }, speed_permille: 0 }
     }
 
     /// Records that the robot is lost, and turns to the direction with the most room.
@@ -415,7 +434,7 @@ impl LocalPlanner {
         let room_mm = self.config.clearance_mm.saturating_mul(2);
         self.target_mrad = widest_room_mrad(scan, room_mm).unwrap_or(HALF_TURN_MRAD);
         self.enter(DriveState::Recover);
-        VelocityCommand { heading_mrad: self.target_mrad, speed_permille: 0 }
+        VelocityCommand { heading_mrad: self.target_mrad.clamp(-TURN_MRAD, TURN_MRAD), speed_permille: 0 }
     }
 
     /// Turns round, because the way ahead is no way for the body. The robot returns to the place before.
@@ -426,7 +445,7 @@ impl LocalPlanner {
         self.is_returning = true;
         self.target_mrad = HALF_TURN_MRAD;
         self.enter(DriveState::Recover);
-        VelocityCommand { heading_mrad: self.target_mrad, speed_permille: 0 }
+        VelocityCommand { heading_mrad: self.target_mrad.clamp(-TURN_MRAD, TURN_MRAD), speed_permille: 0 }
     }
 
     /// Drives along the edge between the obstacles in a sector, more slowly with a smaller spread. The heading is that of the exit

@@ -10,6 +10,7 @@
 //! |---|---|
 //! | Heading along an edge, position of a meet point | `voronoi.rs` |
 //! | Gaps that the body does not fit through, walls that hold it | `body.rs` |
+//! | Walls of halls wider than the sonars reach | `hall.rs` |
 //! | State machine from place to place ([`DriveState`]) | `local_planner.rs` |
 //! | Choice of an exit: explore, or drive to a vertex ([`Goal`]) | `route_planner.rs` |
 //! | Travel times over the ways of the map | `routes.rs` |
@@ -23,6 +24,7 @@
 
 mod body;
 mod config;
+mod hall;
 mod local_planner;
 mod route_planner;
 mod routes;

@@ -1,5 +1,6 @@
 //! Confirms meet points over several frames, and reports each of them once.
 
+use super::implausible::Plausibility;
 use super::meet_point::MeetPoint;
 use super::openings::{MergedOpenings, Openings};
 use super::rotation::RotationEstimate;
@@ -73,6 +74,7 @@ pub struct PlaceDetector<const SONARS: usize> {
     geometry: RingGeometry<SONARS>,
     is_started: bool,
     is_blind: bool,
+    plausibility: Plausibility<SONARS>,
     smoother: RangeSmoother<SONARS>,
     /// The newest frame, smoothed.
     smooth_mm: [u16; SONARS],
@@ -102,6 +104,7 @@ impl<const SONARS: usize> PlaceDetector<SONARS> {
             geometry: RingGeometry { bearings_mrad: [0; SONARS] },
             is_started: false,
             is_blind: false,
+            plausibility: Plausibility::new(),
             smoother: RangeSmoother::new(),
             smooth_mm: [DEAD_MM; SONARS],
             frame_index: 0,
@@ -141,6 +144,7 @@ impl<const SONARS: usize> PlaceDetector<SONARS> {
         }
         self.is_started = true;
         self.smooth_mm = [DEAD_MM; SONARS];
+        self.plausibility.clear();
         self.smoother.clear();
         self.frame_index = 0;
         self.rotation = RotationEstimate::new();
@@ -171,9 +175,12 @@ impl<const SONARS: usize> PlaceDetector<SONARS> {
         }
         let frame_index = self.frame_index;
         self.frame_index = self.frame_index.saturating_add(1);
-        let ranges_mm = self.valid_ranges_mm(frame);
+        let mut ranges_mm = self.valid_ranges_mm(frame);
+        for _ in 0..self.plausibility.check(&mut ranges_mm, self.rotation.rotation_mrad()) {
+            self.faults.record(FaultKind::SonarImplausible);
+        }
         self.smooth_mm = self.smoother.update(ranges_mm);
-        let live = self.smooth_mm.iter().filter(|range_mm| **range_mm != DEAD_MM).count();
+        let live = ranges_mm.iter().filter(|range_mm| **range_mm != DEAD_MM).count();
         self.is_blind = live < usize::from(self.config.live_sensors_min);
         bridge_dead_sensors(&mut self.smooth_mm, &self.geometry, &self.config);
         if self.is_blind {

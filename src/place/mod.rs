@@ -41,6 +41,7 @@
 mod config;
 mod detector;
 mod fingerprint;
+mod implausible;
 mod meet_point;
 mod openings;
 mod rotation;

@@ -6,6 +6,8 @@ use crate::ring::RingGeometry;
 
 /// Range of a sensor without a valid measurement.
 pub(super) const DEAD_MM: u16 = 0;
+/// Two ranges from one obstacle differ by at most this, in millimetres: the travel of some frames and noise.
+const AGREE_MM: u16 = 200;
 /// Range of a sensor that received no echo.
 pub(super) const SILENT_MM: u16 = u16::MAX;
 
@@ -31,7 +33,7 @@ impl<const SONARS: usize> RangeSmoother<SONARS> {
         let mut smooth_mm = now_mm;
         let earlier_mm = before_mm.into_iter().zip(long_before_mm).zip(first_mm);
         for (smooth_mm, ((before_mm, long_before_mm), first_mm)) in smooth_mm.iter_mut().zip(earlier_mm) {
-            *smooth_mm = smoothed(*smooth_mm, before_mm, long_before_mm, first_mm);
+            *smooth_mm = smoothed([*smooth_mm, before_mm, long_before_mm, first_mm]);
         }
         smooth_mm
     }
@@ -42,17 +44,43 @@ pub(super) const fn is_echo(range_mm: u16) -> bool {
     range_mm != DEAD_MM && range_mm != SILENT_MM
 }
 
-/// Median of a sensor's last three ranges, newest first. Where the median is silence but two of the last four ranges are
-/// echoes, the shortest of the three: a sonar misses an obstacle more often than it reports one that does not exist.
-fn smoothed(now_mm: u16, before_mm: u16, long_before_mm: u16, first_mm: u16) -> u16 {
+/// Whether two ranges are echoes from about the same distance.
+const fn agree(one_mm: u16, other_mm: u16) -> bool {
+    is_echo(one_mm) && is_echo(other_mm) && one_mm.abs_diff(other_mm) <= AGREE_MM
+}
+
+/// The range of a sensor from its last four frames, newest first: the median of the three newest valid ranges.
+///
+/// Where the median is silence, or no two of the three are echoes that agree, two echoes among four that agree decide: a sonar misses an
+/// obstacle more often than it reports one that does not exist. Where none agree either, the longest range: a false echo must not stop the
+/// robot. A sensor is dead when it did not answer in three frames.
+fn smoothed(frames_mm: [u16; 4]) -> u16 {
+    if frames_mm.iter().take(3).all(|range_mm| *range_mm == DEAD_MM) {
+        return DEAD_MM;
+    }
+    let mut valid_mm = frames_mm.into_iter().filter(|range_mm| *range_mm != DEAD_MM);
+    let (now_mm, before_mm, long_before_mm) = (valid_mm.next(), valid_mm.next(), valid_mm.next());
     match (now_mm, before_mm, long_before_mm) {
-        (DEAD_MM, _, _) => DEAD_MM,
-        (_, DEAD_MM, DEAD_MM) => now_mm,
-        (_, DEAD_MM, other_mm) | (_, other_mm, DEAD_MM) => now_mm.min(other_mm),
-        _ => {
-            let median_mm = now_mm.min(before_mm).max(now_mm.max(before_mm).min(long_before_mm));
-            let is_missed = median_mm == SILENT_MM && is_echo(first_mm);
-            if is_missed { now_mm.min(before_mm).min(long_before_mm) } else { median_mm }
+        (None, ..) => DEAD_MM,
+        (Some(now_mm), None, _) => now_mm,
+        (Some(now_mm), Some(before_mm), None) if agree(now_mm, before_mm) => now_mm.min(before_mm),
+        (Some(now_mm), Some(before_mm), None) => now_mm.max(before_mm),
+        (Some(now_mm), Some(before_mm), Some(long_before_mm)) => {
+            let (nearer_mm, farther_mm) = (now_mm.min(before_mm), now_mm.max(before_mm));
+            let median_mm = nearer_mm.max(farther_mm.min(long_before_mm));
+            let do_agree =
+                agree(now_mm, before_mm) || agree(now_mm, long_before_mm) || agree(before_mm, long_before_mm);
+            if do_agree {
+                return median_mm;
+            }
+            let first_mm = valid_mm.next().unwrap_or(DEAD_MM);
+            let confirmed_mm =
+                [now_mm, before_mm, long_before_mm].into_iter().find(|range_mm| agree(*range_mm, first_mm));
+            match confirmed_mm {
+                Some(range_mm) => range_mm,
+                None if median_mm == SILENT_MM => SILENT_MM,
+                None => farther_mm.max(long_before_mm),
+            }
         }
     }
 }
@@ -89,20 +117,34 @@ pub(super) fn bridge_dead_sensors<const SONARS: usize>(
 mod tests {
     use super::*;
 
+    fn smooth([first_mm, long_before_mm, before_mm, now_mm]: [u16; 4]) -> u16 {
+        smoothed([now_mm, before_mm, long_before_mm, first_mm])
+    }
+
     #[test]
     fn two_echoes_among_four_ranges_count_as_an_echo_and_one_does_not() {
-        let smooth = |ranges_mm: [u16; 4]| {
-            let [first_mm, long_before_mm, before_mm, now_mm] = ranges_mm;
-            smoothed(now_mm, before_mm, long_before_mm, first_mm)
-        };
         assert_eq!(smooth([900, 910, 920, 930]), 920);
         assert_eq!(smooth([900, SILENT_MM, 920, 930]), 930);
         assert_eq!(smooth([900, SILENT_MM, SILENT_MM, 930]), 930);
         assert_eq!(smooth([900, SILENT_MM, 920, SILENT_MM]), 920);
         assert_eq!(smooth([SILENT_MM, SILENT_MM, 920, SILENT_MM]), SILENT_MM);
         assert_eq!(smooth([900, SILENT_MM, SILENT_MM, SILENT_MM]), SILENT_MM);
+    }
+
+    #[test]
+    fn echoes_that_do_not_agree_are_no_obstacle() {
+        assert_eq!(smooth([3100, SILENT_MM, 920, SILENT_MM]), SILENT_MM);
+        assert_eq!(smooth([SILENT_MM, SILENT_MM, 300, 2500]), SILENT_MM);
+        assert_eq!(smooth([2480, SILENT_MM, 300, 2500]), 2500);
+        assert_eq!(smooth([900, 910, 300, 2500]), 910);
+    }
+
+    #[test]
+    fn a_sensor_keeps_its_range_for_two_frames_without_an_answer() {
+        assert_eq!(smooth([900, 910, 920, DEAD_MM]), 910);
+        assert_eq!(smooth([900, 910, DEAD_MM, DEAD_MM]), 900);
+        assert_eq!(smooth([900, DEAD_MM, DEAD_MM, DEAD_MM]), DEAD_MM);
         assert_eq!(smooth([900, DEAD_MM, DEAD_MM, SILENT_MM]), SILENT_MM);
-        assert_eq!(smooth([900, 910, DEAD_MM, SILENT_MM]), 910);
-        assert_eq!(smooth([900, 910, 920, DEAD_MM]), DEAD_MM);
+        assert_eq!(smooth([DEAD_MM, DEAD_MM, DEAD_MM, 900]), 900);
     }
 }

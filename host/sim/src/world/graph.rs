@@ -50,7 +50,7 @@ impl Graph {
                     at = next;
                 }
                 if let (Some(from), Some(to)) = (node_of[*first], node_of[at]) {
-                    graph.edges.push(TrueEdge { nodes: [from, to], way });
+                    graph.edges.push(TrueEdge { nodes: [from, to], way, room_mm: 0.0 });
                 }
             }
         }

@@ -11,7 +11,8 @@ const MATCH_MM: f64 = 500.0;
 /// Largest offset between a visit and a place that belongs to it, in frames.
 const MATCH_FRAMES: u32 = 30;
 
-/// A robot that drove a way is at most this far from it, at each quarter of the time, in millimetres.
+/// A robot that drove a way is at most this far from it, at each quarter of the time, in millimetres. Through a hall the robot may drive along
+/// the walls: there it is at most as far from the way as the walls are.
 const ON_WAY_MM: f64 = 1500.0;
 
 /// One visit to a true node.
@@ -130,7 +131,9 @@ impl GroundTruth {
         };
         let offs = ways.filter(joins).map(|(edge, is_reversed)| (off_mm(edge, is_reversed), (edge, is_reversed)));
         let nearest = offs.min_by(|one, other| one.0.total_cmp(&other.0));
-        nearest.filter(|(off_mm, _)| *off_mm <= ON_WAY_MM).map(|(_, way)| way)
+        let is_on_way =
+            |&(off_mm, (edge, _)): &(f64, (usize, bool))| off_mm <= ON_WAY_MM.max(self.map.edges[edge].room_mm);
+        nearest.filter(is_on_way).map(|(_, way)| way)
     }
 
     /// The visit that each detected place belongs to; `None` for a phantom.

@@ -256,7 +256,7 @@ impl Simulation {
         let onward: Vec<_> = ways.iter().copied().filter(|way| *way != u_turn).collect();
         let turn_back = onward.is_empty() || self.random.random_bool(self.model.u_turn_share);
         let (edge, reversed) = if turn_back { u_turn } else { onward[self.random.random_range(0..onward.len())] };
-        let TrueEdge { nodes, way } = &self.map.edges[edge];
+        let TrueEdge { nodes, way, .. } = &self.map.edges[edge];
         self.way = if reversed { way.iter().rev().copied().collect() } else { way.clone() };
         self.target = nodes[usize::from(!reversed)];
         self.turns = [Some(if turn_back { Exit::Back } else { Exit::On }), self.turns[0]];

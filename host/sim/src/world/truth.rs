@@ -85,6 +85,8 @@ pub struct TrueEdge {
     pub nodes: [usize; 2],
     /// The way from the first node to the second.
     pub way: Vec<Point>,
+    /// The largest distance of the way from the walls, in millimetres.
+    pub room_mm: f64,
 }
 
 /// One end of an edge at one of its nodes.
@@ -235,7 +237,10 @@ impl TrueMap {
             let only = widest.filter(fits).ok_or(VoronoiError::NoPlace)?;
             graph.add_node(skeleton.points[only], radii_mm[only], true);
         }
-        let (nodes, edges) = graph.finish(limits);
+        let (nodes, mut edges) = graph.finish(limits);
+        for edge in &mut edges {
+            edge.room_mm = edge.way.iter().map(|point| walls.clearance_mm(*point)).fold(0.0, f64::max);
+        }
         Ok(Self { nodes, edges, dropped, unreachable })
     }
 
@@ -255,7 +260,7 @@ impl TrueMap {
 
     /// One end of an edge: the first node is that of the way, or the second if it is reversed.
     pub fn way(&self, edge: usize, is_reversed: bool) -> TrueWay {
-        let TrueEdge { nodes, way } = &self.edges[edge];
+        let TrueEdge { nodes, way, .. } = &self.edges[edge];
         let node = &self.nodes[nodes[usize::from(is_reversed)]];
         let mut points: Vec<Point> = way.clone();
         if is_reversed {
