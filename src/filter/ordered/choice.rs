@@ -1,7 +1,7 @@
 //! The ways to explain a place: where the robot left the place before and where it came to.
 
 use super::model::Model;
-use crate::map::{DartSet, VertexId, VertexSet};
+use crate::map::{Bearing, DartSet, VertexId, VertexSet};
 
 /// In a path: a place that is not on the map.
 pub(crate) const OFF_MAP: u8 = 254;
@@ -18,6 +18,8 @@ pub(super) enum Target {
     New,
     /// This way of a vertex that is on the map.
     At(u8),
+    /// A way with this bearing of a vertex that is on the map, which no visit has shown.
+    Unseen(u8, Bearing),
     /// A place that has no vertex on the map, and for which the map has no room.
     OffMap,
 }

@@ -177,12 +177,19 @@ impl<const V: usize, const D: usize, const T: usize> Hypothesis<V, D, T> {
                     propose(Target::At(frontier));
                 }
             }
+            for vertex in 0..self.map.vertices() {
+                if !self.is_far(model, entry.steps, vertex)
+                    && let Some(bearing) = self.unseen_reference(&entry, vertex)
+                {
+                    propose(Target::Unseen(vertex, bearing));
+                }
+            }
         }
     }
 
     /// What a choice gains, given what the robot reported of its exit.
     pub(super) fn gain(&self, model: &Model, entry: &Entry, reported: ReportedExit, choice: Choice) -> Gain {
-        let is_closure = matches!(choice.target, Target::At(_)) && choice.exit != NONE;
+        let is_closure = matches!(choice.target, Target::At(_) | Target::Unseen(..)) && choice.exit != NONE;
         let closures = if is_closure { self.closures(choice.exit) } else { Closures::NONE };
         self.gain_with(model, entry, reported, choice, &closures)
     }
@@ -200,6 +207,7 @@ impl<const V: usize, const D: usize, const T: usize> Hypothesis<V, D, T> {
         let mut gain = match target {
             Target::New => self.new_arrival(model, entry),
             Target::At(dart) => self.arrival(model, entry, dart),
+            Target::Unseen(vertex, bearing) => self.unseen_arrival(model, entry, vertex, bearing),
             Target::Known => self.arrival(model, entry, self.map.partner(exit).unwrap_or(NONE)),
             Target::OffMap => return Gain { labels: 0.0, rest: LN_OFF_MAP },
         };
@@ -222,6 +230,12 @@ impl<const V: usize, const D: usize, const T: usize> Hypothesis<V, D, T> {
                     model.closure(closures.frontiers.into(), closures.keep_genus(exit, dart, vertex))
                 }
             }
+            Target::Unseen(vertex, bearing) => {
+                // The way would lie between the one before it and this one.
+                let next = self.way_after(vertex, bearing);
+                model.travel((0, 0), entry.ln_travel)
+                    + model.closure(usize::from(closures.frontiers) + 1, closures.keep_genus(exit, next, vertex))
+            }
         };
         gain
     }
@@ -236,27 +250,35 @@ impl<const V: usize, const D: usize, const T: usize> Hypothesis<V, D, T> {
         Closures { face: self.map.face_of(exit), connected, frontiers }
     }
 
-    /// The key that the hypothesis would have.
-    pub(super) fn key_with(&self, choice: Choice) -> u32 {
+    /// The key that the map would have with a choice, and that of the hypothesis.
+    pub(super) fn keys_with(&self, choice: Choice) -> (u32, u32) {
         // A way that no visit has shown is added first.
         let darts = self.map.darts();
         let (exit, added) = if choice.exit == UNSEEN { (darts, darts.saturating_add(1)) } else { (choice.exit, darts) };
         let (at, is_joined) = match choice.target {
             Target::Known => (self.map.partner(choice.exit).unwrap_or(NONE), false),
-            Target::New => (added, exit != NONE),
+            Target::New | Target::Unseen(..) => (added, exit != NONE),
             Target::At(dart) => (dart, exit != NONE),
             Target::OffMap => (OFF_MAP, false),
         };
-        let map_key = if is_joined { self.map_key.wrapping_add(edge_key(exit, at)) } else { self.map_key };
-        keyed(map_key, at)
+        let vertex = match choice.target {
+            Target::New => self.map.vertices(),
+            Target::Unseen(vertex, _) => vertex,
+            _ => self.map.vertex(at),
+        };
+        let from = self.map.vertex(if choice.exit == UNSEEN { self.at } else { exit });
+        let map_key =
+            if is_joined { self.map_key.wrapping_add(edge_key((exit, from), (at, vertex))) } else { self.map_key };
+        (map_key, keyed(map_key, at))
     }
 
     /// Whether there is room for what a choice adds.
     pub(super) fn has_room(&self, choice: Choice) -> bool {
         let unseen = usize::from(choice.exit == UNSEEN);
         let vertices = usize::from(choice.target == Target::New);
+        let ways = usize::from(matches!(choice.target, Target::Unseen(..)));
         usize::from(self.map.vertices()) + vertices <= V
-            && usize::from(self.map.darts()) + vertices * WAYS_MAX + unseen <= D
+            && usize::from(self.map.darts()) + vertices * WAYS_MAX + unseen + ways <= D
             && (unseen == 0 || self.map.ways(self.map.vertex(self.at)).len() < WAYS_MAX)
     }
 
@@ -282,6 +304,7 @@ impl<const V: usize, const D: usize, const T: usize> Hypothesis<V, D, T> {
                 self.map.add_way(vertex, frame).unwrap_or(NONE)
             }
             Target::At(dart) => dart,
+            Target::Unseen(vertex, bearing) => self.map.add_way(vertex, bearing).unwrap_or(NONE),
             Target::OffMap => OFF_MAP,
         };
         self.at = at;
@@ -293,7 +316,7 @@ impl<const V: usize, const D: usize, const T: usize> Hypothesis<V, D, T> {
         }
         if choice.target != Target::Known && exit != NONE {
             self.map.join(exit, at);
-            self.map_key = self.map_key.wrapping_add(edge_key(exit, at));
+            self.map_key = self.map_key.wrapping_add(self.edge_key(exit, at));
         }
         if entry.ln_travel > 0 && exit != NONE {
             self.map.time(at, entry.ln_travel);
@@ -362,21 +385,26 @@ impl<const V: usize, const D: usize, const T: usize> Hypothesis<V, D, T> {
         lacks_room
     }
 
+    fn edge_key(&self, a: u8, b: u8) -> u32 {
+        edge_key((a, self.map.vertex(a)), (b, self.map.vertex(b)))
+    }
+
     /// Computes the key of the map from its edges. Cost: O(D).
     pub(super) fn rekey(&mut self) {
-        self.map_key = self.map.edges().map(|(a, b)| edge_key(a, b)).fold(0, u32::wrapping_add);
+        self.map_key = self.map.edges().map(|(a, b)| self.edge_key(a, b)).fold(0, u32::wrapping_add);
     }
 }
 
-fn mix(value: u32) -> u32 {
+pub(super) const fn mix(value: u32) -> u32 {
     let value = (value ^ value >> 16).wrapping_mul(0x7FEB_352D);
     let value = (value ^ value >> 15).wrapping_mul(0x846C_A68B);
     value ^ value >> 16
 }
 
 /// Darts are numbered in the order of the places at which they were seen first, so equal maps have equal numbers.
-fn edge_key(a: u8, b: u8) -> u32 {
-    mix(0x1_0000 | u32::from(a.min(b)) << 8 | u32::from(a.max(b)))
+fn edge_key(a: (u8, u8), b: (u8, u8)) -> u32 {
+    let (a, b) = (a.min(b), a.max(b));
+    mix(u32::from_be_bytes([a.0, a.1, b.0, b.1]))
 }
 
 fn keyed(map_key: u32, at: u8) -> u32 {

@@ -44,6 +44,16 @@ pub(super) const fn ln(x: f32) -> f32 {
     exponent as f32 * LN_2 + 2.0 * s * series
 }
 
+/// Noise that makes the largest of perturbed logarithms a draw, from 24 random bits.
+pub(super) fn gumbel(bits: u32) -> f32 {
+    -ln(-ln(uniform(bits)))
+}
+
+/// A number between 0 and 1, without either, from 24 random bits.
+pub(super) fn uniform(bits: u32) -> f32 {
+    ((bits >> 8) as f32 + 0.5) / (1 << 24) as f32
+}
+
 /// ln k; 0 for k = 0.
 pub(super) fn ln_of(count: usize) -> f32 {
     LN.get(count).copied().unwrap_or(5.55)

@@ -218,7 +218,7 @@ impl<const V: usize, const D: usize, const T: usize> Builder<'_, V, D, T> {
             Target::New if choice.exit < UNSEEN && self.record.get(index + 1).exit().is_some_and(Exit::is_back) => {
                 self.arrive(on, index + 1, choice.exit) + self.follow_known(on, index + 1, choice.exit)
             }
-            Target::New | Target::OffMap => -OPEN,
+            Target::New | Target::Unseen(..) | Target::OffMap => -OPEN,
         }
     }
 

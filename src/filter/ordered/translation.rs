@@ -9,24 +9,19 @@ use crate::map::NONE;
 pub(super) struct Translation<const V: usize, const D: usize> {
     vertex: [u8; V],
     dart: [u8; D],
-    is_image: [bool; D],
 }
 
 impl<const V: usize, const D: usize> Translation<V, D> {
     pub(super) const fn new() -> Self {
-        Self { vertex: [0; V], dart: [0; D], is_image: [false; D] }
+        Self { vertex: [0; V], dart: [0; D] }
     }
 
     /// Starts with the first vertices and darts, which are the same in both maps.
     pub(super) fn start(&mut self, vertices: u8, darts: u8) {
         self.vertex.fill(NONE);
         self.dart.fill(NONE);
-        self.is_image.fill(false);
         (0..vertices).zip(&mut self.vertex).for_each(|(vertex, image)| *image = vertex);
-        (0..darts).zip(self.dart.iter_mut().zip(&mut self.is_image)).for_each(|(dart, (image, is_image))| {
-            *image = dart;
-            *is_image = true;
-        });
+        (0..darts).zip(&mut self.dart).for_each(|(dart, image)| *image = dart);
     }
 
     /// A dart with this image.
@@ -36,12 +31,8 @@ impl<const V: usize, const D: usize> Translation<V, D> {
 
     /// Follows a change of the numbers of the images.
     pub(super) fn renumber(&mut self, numbers: &[u8; D]) {
-        self.is_image.fill(false);
         for slot in &mut self.dart {
             *slot = numbers.get(usize::from(*slot)).copied().unwrap_or(NONE);
-            if let Some(is_image) = self.is_image.get_mut(usize::from(*slot)) {
-                *is_image = true;
-            }
         }
     }
 
@@ -56,11 +47,8 @@ impl<const V: usize, const D: usize> Translation<V, D> {
     }
 
     pub(super) fn set(&mut self, dart: u8, image: u8) {
-        if let (Some(slot), Some(is_image)) =
-            (self.dart.get_mut(usize::from(dart)), self.is_image.get_mut(usize::from(image)))
-        {
+        if let Some(slot) = self.dart.get_mut(usize::from(dart)) {
             *slot = image;
-            *is_image = true;
         }
     }
 
@@ -90,7 +78,8 @@ impl<const V: usize, const D: usize> Translation<V, D> {
         let mut best = (None, SAME_WAY + 1);
         for &way in to.map.ways(vertex) {
             let off = |bearing: u16| (bearing.wrapping_sub(to.map.bearing(way)) as i16).unsigned_abs();
-            if off(bearing) >= best.1 || self.is_image.get(usize::from(way)) != Some(&false) {
+            let is_image = |&other: &u8| self.dart.get(usize::from(other)) == Some(&way);
+            if off(bearing) >= best.1 || from.map.ways(mine).iter().any(is_image) {
                 continue;
             }
             // Another dart without an image may be closer.

@@ -1,15 +1,23 @@
 //! The ways seen at a visit as evidence: which way of the vertex each of them is, by its bearing, and how likely that is.
 
+use super::choice::Gain;
 use super::hypothesis::Hypothesis;
 use super::model::{Model, SAME_WAY};
 use super::record::Entry;
-use crate::map::{NONE, WAYS_MAX};
+use crate::map::{Bearing, NONE, WAYS_MAX};
+
+/// A way that none of more looks has shown is not considered.
+const UNSEEN_LOOKS: u8 = 2;
 
 impl<const V: usize, const D: usize, const T: usize> Hypothesis<V, D, T> {
     /// Which way of a vertex each of the other ways seen is, the robot having come by `reference`, and how far it is off; the
     /// closest first.
     pub(super) fn identify(&self, entry: &Entry, vertex: u8, reference: u8) -> [(u8, i16); WAYS_MAX - 1] {
-        let base = self.map.bearing(reference);
+        self.identify_from(entry, vertex, reference, self.map.bearing(reference))
+    }
+
+    /// As [`Hypothesis::identify`], with the bearing of the way that the robot came by, which need not be on the map.
+    fn identify_from(&self, entry: &Entry, vertex: u8, reference: u8, base: Bearing) -> [(u8, i16); WAYS_MAX - 1] {
         let ways = self.map.ways(vertex);
         let mut found = [(NONE, 0); WAYS_MAX - 1];
         // Where no two ways seen have the same closest way, each is that one.
@@ -54,6 +62,48 @@ impl<const V: usize, const D: usize, const T: usize> Hypothesis<V, D, T> {
         found
     }
 
+    /// The bearing of a way of a vertex that no visit has shown, if the robot came by it: the one at which the ways seen are closest to
+    /// those of the vertex. `None` when the vertex was looked at too often for that, or when it is the bearing of one of its ways.
+    /// Cost: O(ways²) for each way seen.
+    pub(super) fn unseen_reference(&self, entry: &Entry, vertex: u8) -> Option<Bearing> {
+        let ways = self.map.ways(vertex);
+        if !(1..=UNSEEN_LOOKS).contains(&self.label(vertex).looks) || ways.len() >= WAYS_MAX {
+            return None;
+        }
+        let off = |bearing: Bearing| {
+            let offs = ways.iter().map(|&way| (bearing.wrapping_sub(self.map.bearing(way)) as i16).unsigned_abs());
+            offs.min().unwrap_or(u16::MAX)
+        };
+        let mut best = (u32::MAX, None);
+        for seen in entry.others() {
+            for &way in ways {
+                let base = self.map.bearing(way).wrapping_sub(seen);
+                if off(base) > SAME_WAY {
+                    let sum = entry.others().map(|seen| u32::from(off(base.wrapping_add(seen)).min(SAME_WAY))).sum();
+                    if sum < best.0 {
+                        best = (sum, Some(base));
+                    }
+                }
+            }
+        }
+        best.1
+    }
+
+    /// What it gains to be at a vertex, having come there by a way with this bearing that no visit has shown.
+    pub(super) fn unseen_arrival(&self, model: &Model, entry: &Entry, vertex: u8, bearing: Bearing) -> Gain {
+        let label = self.label(vertex);
+        Gain {
+            labels: label.including(entry.steps).evidence(model) - label.evidence(model),
+            rest: self.ways_evidence_from(model, entry, vertex, NONE, bearing),
+        }
+    }
+
+    /// The first way of a vertex counter-clockwise from a bearing.
+    pub(super) fn way_after(&self, vertex: u8, bearing: Bearing) -> u8 {
+        let ahead = |&way: &u8| self.map.bearing(way).wrapping_sub(bearing);
+        self.map.ways(vertex).iter().copied().min_by_key(ahead).unwrap_or(NONE)
+    }
+
     /// How far the mean bearing of the way that the robot came by seems to be off, and how much the offs of the others weigh.
     pub(super) fn reference_off(&self, found: &[(u8, i16)], reference: u8) -> (f32, f32) {
         let (mut sum, mut weight) = (0.0, 0.0);
@@ -69,12 +119,16 @@ impl<const V: usize, const D: usize, const T: usize> Hypothesis<V, D, T> {
 
     /// ln P of the ways seen at a vertex that the robot came to by `reference`.
     pub(super) fn ways_evidence(&self, model: &Model, entry: &Entry, vertex: u8, reference: u8) -> f32 {
+        self.ways_evidence_from(model, entry, vertex, reference, self.map.bearing(reference))
+    }
+
+    fn ways_evidence_from(&self, model: &Model, entry: &Entry, vertex: u8, reference: u8, base: Bearing) -> f32 {
         if entry.count() == 0 {
             return 0.0;
         }
         let looks = self.label(vertex).looks;
         let others = usize::from(entry.count()) - 1;
-        let found = self.identify(entry, vertex, reference);
+        let found = self.identify_from(entry, vertex, reference, base);
         let (reference_off, weight) = self.reference_off(&found, reference);
         let mut evidence = model.reference(reference_off, self.map.seen(reference), looks, weight);
         for &(way, off) in found.iter().take(others) {
@@ -180,5 +234,27 @@ mod tests {
         assert!(evidence(&[1500, 3000]) > evidence(&[1500]));
         assert!(evidence(&[1500]) > evidence(&[1500, 3000, 4500]) - 6.0);
         assert!(evidence(&[700, 4500]) < evidence(&[1500]) - 6.0);
+    }
+
+    #[test]
+    fn the_bearing_of_a_way_that_was_always_missed_follows_from_the_others() {
+        let hypothesis = vertex(&[(0.0, 1), (1.5, 1), (3.0, 1)], 1);
+        // A robot that comes by a way at 4.6 sees the others at 1.68, 3.18 and 4.68 from there.
+        let bearing = hypothesis.unseen_reference(&entry(&[1680, 3180, 4680]), 0).unwrap();
+        assert!(off(bearing, 4.6) < 0.1, "{bearing}");
+        let mut model = Model::new();
+        model.configure(&OrderedConfig::DEFAULT.with_noise_mm(20));
+        let gain = hypothesis.unseen_arrival(&model, &entry(&[1680, 3180, 4680]), 0, bearing);
+        let by_a_known_way = hypothesis.arrival(&model, &entry(&[1680, 3180, 4680]), hypothesis.map.ways(0)[0]);
+        assert!(gain.rest > by_a_known_way.rest && gain.labels == by_a_known_way.labels);
+        // It is none of the ways that were seen, and not missed again and again.
+        assert_eq!(hypothesis.unseen_reference(&entry(&[1500]), 0).map(|bearing| off(bearing, 0.0) > 0.55), Some(true));
+        assert_eq!(vertex(&[(0.0, 3), (1.5, 3), (3.0, 3)], 3).unseen_reference(&entry(&[1680, 3180, 4680]), 0), None);
+    }
+
+    /// The angle between a bearing and one in radians.
+    fn off(bearing: Bearing, radians: f64) -> f64 {
+        let radians = radians * 65536.0 / core::f64::consts::TAU;
+        f64::from(bearing.wrapping_sub(radians as u16) as i16).abs() / 65536.0 * core::f64::consts::TAU
     }
 }
