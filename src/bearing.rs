@@ -46,6 +46,16 @@ impl Vector {
         square(self.x).saturating_add(square(self.y)).isqrt().min(i32::MAX as u64) as i32
     }
 
+    /// Rotates the vector counter-clockwise.
+    pub(crate) fn rotated(self, by_mrad: i32) -> Self {
+        let axis = unit(rotated(0, by_mrad));
+        let part = |x: i32, y: i32| {
+            let sum = i64::from(self.x) * i64::from(x) + i64::from(self.y) * i64::from(y);
+            (sum / i64::from(UNIT)).clamp(i64::from(i32::MIN), i64::from(i32::MAX)) as i32
+        };
+        Self { x: part(axis.x, -axis.y), y: part(axis.y, axis.x) }
+    }
+
     /// Bearing of the vector, 0 for the null vector. The error is at most 5 mrad: in the first octant the arctangent is
     /// approximated by z · (π/4 + 0.273 · (1 − z)).
     pub(crate) fn bearing_mrad(self) -> i16 {
@@ -90,6 +100,17 @@ mod tests {
         assert_eq!(rotated(-3000, -284), 3000);
         assert_eq!(rotated(100, -300), -200);
         assert_eq!(rotated(-3142, -3142), 0);
+    }
+
+    #[test]
+    fn a_rotated_vector_keeps_its_length() {
+        let vector = Vector { x: 3000, y: -4000 };
+        for by_mrad in (-3142..=3142).step_by(100) {
+            let rotated_vector = vector.rotated(by_mrad);
+            assert!((rotated_vector.length() - 5000).abs() <= 12, "{by_mrad}: {rotated_vector:?}");
+            let turned_mrad = turn_mrad(vector.bearing_mrad(), rotated_vector.bearing_mrad());
+            assert!(turn_mrad(turned_mrad as i16, by_mrad as i16).abs() <= 12, "{by_mrad}: {turned_mrad}");
+        }
     }
 
     #[test]

@@ -149,6 +149,7 @@ impl<const SONARS: usize, const V: usize, F: Filter<V>> Mapper<SONARS, V, F> {
     /// Voronoi graph.
     pub fn kidnapped(&mut self) {
         self.starts_sequence = true;
+        self.detector.forget_way();
     }
 
     /// Announces that the robot has not left the last place; see [`PlaceDetector::hold_place`].

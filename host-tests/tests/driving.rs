@@ -252,3 +252,52 @@ fn one_of_two_parallel_corridors_is_the_shorter_way_to_a_vertex() {
         assert!(steps <= 5, "{steps} places to vertex {vertex}");
     }
 }
+
+/// A corridor 2 m wide with a room of 4.3 m by 3.4 m on each side, each behind a door of this width in a wall of 0.2 m.
+fn rooms_at_a_corridor(door_mm: f64) -> Plan {
+    const CELL_MM: f64 = 50.0;
+    let free = [
+        (0.0, 4000.0, 12_000.0, 6000.0),
+        (2000.0, 6200.0, 6300.0, 9600.0),
+        (6000.0, 400.0, 10_300.0, 3800.0),
+        (3200.0, 6000.0, 3200.0 + door_mm, 6200.0),
+        (8300.0, 3800.0, 8300.0 + door_mm, 4000.0),
+    ];
+    let cell = |row: u32, column: u32| {
+        let (x, y) = ((f64::from(column) + 0.5) * CELL_MM, (f64::from(row) + 0.5) * CELL_MM);
+        let is_free = free.iter().any(|(left, low, right, high)| x > *left && x < *right && y > *low && y < *high);
+        if (row, column) == (100, 110) {
+            'S'
+        } else if is_free {
+            '.'
+        } else {
+            '#'
+        }
+    };
+    let rows = (0..200).rev().map(|row| (0..240).map(|column| cell(row, column)).collect::<String>());
+    let rows: Vec<String> = rows.collect();
+    Plan::parse(&format!("cell_mm {CELL_MM}\n{}", rows.join("\n"))).unwrap()
+}
+
+#[test]
+fn rooms_behind_doors_of_any_width_are_entered_and_left() {
+    for (door_mm, seed) in [(800.0, 1), (1000.0, 2), (1200.0, 3), (1400.0, 4), (1600.0, 5)] {
+        let plan = rooms_at_a_corridor(door_mm);
+        let mut buffer = [0; SNAPSHOT_BYTES];
+        let mut exploration = Exploration::start(&plan, RobotModel::default(), seed, &mut buffer).unwrap();
+        let mut changes = [0; 2];
+        let mut is_inside = [false; 2];
+        while exploration.places() < 30 {
+            exploration.advance();
+            assert!(exploration.frames() < 15_000, "door of {door_mm} mm: {} places", exploration.places());
+            let y_mm = exploration.rover().position().y_mm;
+            for (room, is_in) in [y_mm > 6500.0, y_mm < 3500.0].into_iter().enumerate() {
+                changes[room] += usize::from(is_in != is_inside[room]);
+                is_inside[room] = is_in;
+            }
+        }
+        assert!(changes.iter().all(|changes| *changes >= 2), "door of {door_mm} mm: {changes:?}");
+        // The robot searches for the graph at the start, with any heading.
+        assert!(exploration.times_lost() <= 1, "door of {door_mm} mm: lost {} times", exploration.times_lost());
+    }
+}

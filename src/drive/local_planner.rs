@@ -2,9 +2,9 @@
 
 use super::body::{Body, widest_room_mrad};
 use super::hall::Hall;
-use super::voronoi::{Sector, edge_heading_mrad, meet_point_offset_mm};
+use super::voronoi::{Sector, beside_mm, edge_heading_mrad, gap_ahead_mrad, meet_point_offset_mm};
 use super::{DriveConfig, VelocityCommand};
-use crate::bearing::{HALF_TURN_MRAD, counter_clockwise_mrad, rotated, turn_mrad};
+use crate::bearing::{HALF_TURN_MRAD, Vector, counter_clockwise_mrad, rotated, turn_mrad};
 use crate::config_error::ConfigError;
 use crate::fault::{FaultCounters, FaultKind};
 use crate::filter::{Exit, Passage};
@@ -35,6 +35,22 @@ const SWAY_MRAD: i16 = 260;
 const SWAY_FRAMES: u16 = 8;
 /// At a place the planner waits at most this many frames for as many openings as the detector counted.
 const CHOOSE_FRAMES: u16 = 12;
+/// A robot that looks for a narrow gap turns towards this bearing on either side, in milliradians,
+const LOOK_ROUND_MRAD: i16 = 180;
+/// for this number of frames each; a power of two.
+const LOOK_ROUND_FRAMES: u16 = 8;
+/// After as many returns to a place the robot is lost: no exit leads on.
+const MAX_RETURNS: u8 = 4;
+/// A door is hidden when a sonar within this angle of it hears its jambs, in milliradians.
+const HIDDEN_MRAD: i32 = 200;
+/// Back is the exit within this angle of the way by which the robot came, in milliradians.
+const BACK_MRAD: i32 = 400;
+/// The position of a gap is known to about this distance, in thousandths of the way of a frame at full speed.
+const HOME_PERMILLE: i32 = 10_000;
+/// With a command beyond this bearing the robot turns in place, in milliradians.
+const IN_PLACE_MRAD: u16 = 600;
+/// After this many frames it drives out where the exit must be.
+const SEARCH_FRAMES: u16 = 24;
 /// For this many frames after departing the robot still counts as at the place: an obstacle that is hidden for a moment
 /// must not make another place.
 const DEPART_FRAMES: u16 = 8;
@@ -103,10 +119,24 @@ pub(super) struct LocalPlanner {
     target_mrad: i16,
     /// Change of all bearings since the frame before.
     rotation_mrad: i32,
-    /// The number of openings when the exit was chosen.
-    openings: u8,
-    /// The degree of the place by the detector.
-    degree: Option<u8>,
+    /// The ways of the place by the detector, in the newest frame.
+    ways: Openings,
+    /// Its exits.
+    exits: Exits,
+    /// How often the robot has returned to it.
+    returns: u8,
+    /// Frames in which the robot faced its exit and did not see it.
+    search_frames: u16,
+    /// Where the narrowest point of the edge is, in thousandths of the way of a ring frame at full speed,
+    gap: Vector,
+    /// and the range of the obstacles beside it.
+    gap_mm: u16,
+    /// The radius of the place that the robot left last.
+    radius_mm: u16,
+    /// Whether the robot drives back to that point, without regard to the obstacles beside it.
+    is_homing: bool,
+    /// The distance of the last frame, in thousandths of the way of a frame at full speed.
+    forward_permille: u16,
     departure: Departure,
     /// Whether the robot turned back on its way to the next place.
     is_returning: bool,
@@ -126,8 +156,15 @@ impl LocalPlanner {
             entry_mrad: 0,
             target_mrad: 0,
             rotation_mrad: 0,
-            openings: 0,
-            degree: None,
+            ways: Openings::NONE,
+            exits: Exits::new(0),
+            returns: 0,
+            search_frames: 0,
+            gap: Vector { x: 0, y: 0 },
+            gap_mm: 0,
+            radius_mm: 0,
+            is_homing: false,
+            forward_permille: 0,
             departure: Departure::UNKNOWN,
             is_returning: false,
             body: Body::new(),
@@ -185,12 +222,14 @@ impl LocalPlanner {
         &self.faults
     }
 
-    /// The detector has reported a place of this degree.
-    pub(super) fn arrive(&mut self, degree: Option<u8>) {
+    /// The detector has reported a place with these ways.
+    pub(super) fn arrive(&mut self, ways: Openings) {
         if self.state != DriveState::Approach {
             self.entry_mrad = HALF_TURN_MRAD;
         }
-        self.degree = degree;
+        self.ways = ways;
+        self.exits.clear();
+        self.returns = 0;
         self.departure = Departure::UNKNOWN;
         self.is_returning = false;
         self.enter(DriveState::ChooseExit);
@@ -203,9 +242,9 @@ impl LocalPlanner {
 
     /// The robot is back at the place that was reported last. Bearings are relative to the way by which it first came.
     pub(super) fn arrive_again(&mut self) {
+        self.returns = self.returns.saturating_add(1);
         let came_mrad = if self.state == DriveState::Approach { self.entry_mrad } else { HALF_TURN_MRAD };
         self.entry_mrad = rotated(came_mrad, -i32::from(self.departure.exit_mrad));
-        self.degree = None;
         self.departure = Departure::UNKNOWN;
         self.is_returning = false;
         self.enter(DriveState::ChooseExit);
@@ -237,6 +276,7 @@ impl LocalPlanner {
         self.frames = self.frames.saturating_add(1);
         self.rotation_mrad = rotation_mrad;
         let obstacles = scan.obstacles();
+        self.track_gap(scan);
         self.body.look(scan, nearest_ahead(scan), self.config.body_radius_mm);
         let is_held = self.body.is_held(scan, self.speed_permille, self.config.body_radius_mm);
         let velocity = match self.state {
@@ -252,9 +292,30 @@ impl LocalPlanner {
             DriveState::Recover => self.recover(scan),
             DriveState::Stopped => VelocityCommand::STOP,
         };
+        let aside_mrad = velocity.heading_mrad.unsigned_abs();
+        // The faster wheel is at most at full speed, so an arc is slower.
+        let on_arc_permille = 1000u16.saturating_sub(aside_mrad / 5 * 4);
+        self.forward_permille =
+            if aside_mrad > IN_PLACE_MRAD { 0 } else { velocity.speed_permille.min(on_arc_permille) };
         self.departure.driven_permille = self.departure.driven_permille.saturating_add(velocity.speed_permille.into());
         self.speed_permille = velocity.speed_permille;
         velocity
+    }
+
+    /// Follows the narrowest point of the edge that the robot has driven since the last place.
+    fn track_gap<const SONARS: usize>(&mut self, scan: &RingScan<'_, SONARS>) {
+        self.gap.x = self.gap.x.saturating_sub(self.forward_permille.into());
+        self.gap = self.gap.rotated(self.rotation_mrad);
+        if self.state != DriveState::FollowEdge {
+            return;
+        }
+        let Some(beside_mm) = beside_mm(scan, Sector::BESIDE) else { return };
+        let is_open = nearest_ahead(scan).is_none_or(|ahead| ahead.range_mm > beside_mm.saturating_add(beside_mm / 2));
+        if beside_mm <= self.gap_mm && is_open && !self.is_returning {
+            (self.gap, self.gap_mm) = (Vector { x: 0, y: 0 }, beside_mm);
+        }
+        let is_there = u32::from(beside_mm) * 4 <= u32::from(self.gap_mm) * 5 || self.gap.x < -2 * HOME_PERMILLE;
+        self.is_homing &= !is_there;
     }
 
     fn enter(&mut self, state: DriveState) {
@@ -286,6 +347,9 @@ impl LocalPlanner {
         if self.frames > self.config.timeout_frames.saturating_mul(EDGE_TIMEOUTS) {
             return self.give_up(scan);
         }
+        if self.is_homing {
+            return self.drive_home(scan, obstacles.spread_mm());
+        }
         if let Some(heading_mrad) = self.hall.heading_mrad(scan) {
             return VelocityCommand { heading_mrad, speed_permille: self.config.speed_permille };
         }
@@ -316,7 +380,9 @@ impl LocalPlanner {
             None if self.frames > CHOOSE_FRAMES => {
                 VelocityCommand { heading_mrad: FACING_MRAD as i16, speed_permille: 0 }
             }
-            _ => VelocityCommand::STOP,
+            // A sensor looks through a door: it would not, turned by a few degrees.
+            _ if obstacles.is_at_door() => VelocityCommand::STOP,
+            _ => VelocityCommand { heading_mrad: Self::look_round_mrad(self.frames), speed_permille: 0 },
         }
     }
 
@@ -326,28 +392,38 @@ impl LocalPlanner {
         obstacles: &Obstacles,
         choose: impl FnOnce(&Exits) -> Option<u16>,
     ) -> VelocityCommand {
-        let openings = scan.openings(obstacles);
-        self.track_entry(&openings);
-        let count = openings.bearings_mrad().len();
-        let agrees = self.degree.is_none_or(|degree| usize::from(degree) == count);
-        if count == 0 && self.frames > CHOOSE_FRAMES {
+        if self.returns > MAX_RETURNS {
             return self.give_up(scan);
         }
-        if count == 0 || !agrees && self.frames <= CHOOSE_FRAMES {
-            return VelocityCommand::STOP;
+        if self.exits.as_slice().is_empty() {
+            let openings = if self.ways.count() > 0 { self.ways } else { scan.openings(obstacles) };
+            self.track_entry(&openings);
+            if openings.count() == 0 {
+                return if self.frames > CHOOSE_FRAMES { self.give_up(scan) } else { VelocityCommand::STOP };
+            }
+            for &opening_mrad in openings.bearings_mrad() {
+                let relative_mrad = counter_clockwise_mrad(self.entry_mrad, opening_mrad).min(MAX_RELATIVE_MRAD);
+                self.exits.insert(relative_mrad as u16, |one, other| one <= other);
+            }
         }
-        let mut exits = Exits::new(0);
-        for &opening_mrad in openings.bearings_mrad() {
-            let relative_mrad = counter_clockwise_mrad(self.entry_mrad, opening_mrad).min(MAX_RELATIVE_MRAD);
-            exits.insert(relative_mrad as u16, |one, other| one <= other);
-        }
-        let Some(exit_mrad) = choose(&exits) else {
+        let Some(exit_mrad) = choose(&self.exits) else {
             self.enter(DriveState::Stopped);
             return VelocityCommand::STOP;
         };
         self.departure = Departure { is_known: true, exit_mrad, driven_permille: 0 };
         self.target_mrad = rotated(self.entry_mrad, exit_mrad.into());
-        self.openings = count as u8;
+        // The edge by which the robot came may end at a door that no sonar looks through from here.
+        let is_back = turn_mrad(self.entry_mrad, self.target_mrad).abs() < BACK_MRAD;
+        self.radius_mm = obstacles.radius_mm();
+        let is_door = u32::from(self.gap_mm) * 3 < u32::from(self.radius_mm) * 2;
+        let gap_mrad = self.gap.bearing_mrad();
+        let wall = scan.nearest(|bearing_mrad| turn_mrad(gap_mrad, bearing_mrad).abs() < HIDDEN_MRAD);
+        let is_hidden = wall.is_some_and(|wall| u32::from(wall.range_mm) * 5 < u32::from(self.radius_mm) * 8);
+        self.is_homing = is_back && is_door && is_hidden && self.gap.length() > HOME_PERMILLE;
+        if self.is_homing {
+            self.target_mrad = self.gap.bearing_mrad();
+        }
+        self.search_frames = 0;
         self.enter(DriveState::TurnToExit);
         self.turn_to_exit(scan, obstacles)
     }
@@ -360,16 +436,24 @@ impl LocalPlanner {
         if self.is_timed_out() {
             return self.give_up(scan);
         }
+        if self.is_homing {
+            self.target_mrad = self.gap.bearing_mrad();
+            if i32::from(self.target_mrad).abs() <= FACING_MRAD {
+                self.enter(DriveState::Depart);
+                return self.depart(scan, obstacles, true);
+            }
+            return VelocityCommand { heading_mrad: self.target_mrad, speed_permille: 0 };
+        }
         // An exit that this frame does not show is where the rotation of the ring brings it. While the robot turns, the ring misses
         // openings and merges them: a frame that shows another number of them is trusted less.
         let expected_mrad = rotated(self.target_mrad, self.rotation_mrad);
         let openings = scan.openings(obstacles);
         self.track_entry(&openings);
+        let count = self.exits.as_slice().len();
         // A dead end has no other opening.
-        let is_dead_end = self.degree == Some(1) && openings.count() == 1;
-        let within_mrad = match openings.count() {
-            1 if is_dead_end => HALF_TURN_MRAD as u16,
-            count if count == self.openings => SAME_OPENING_MRAD,
+        let within_mrad = match usize::from(openings.count()) {
+            1 if count == 1 => HALF_TURN_MRAD as u16,
+            seen if seen == count => SAME_OPENING_MRAD,
             _ => DOUBTFUL_OPENING_MRAD,
         };
         let seen = openings.nearest(expected_mrad, within_mrad);
@@ -380,18 +464,24 @@ impl LocalPlanner {
         if !(is_behind && is_reversed) {
             self.target_mrad = target_mrad;
         }
-        // With the sensors ahead dead the exit is not seen, and the estimate has to do.
         let facing_mrad = facing_mrad(scan);
-        let is_certain = seen.is_some() || facing_mrad > FACING_MRAD;
-        if is_certain && i32::from(self.target_mrad).abs() <= facing_mrad {
-            // The way by which the robot came and the exit are tracked separately. When they do not agree, one of them is another opening.
-            let exit_mrad = counter_clockwise_mrad(self.entry_mrad, self.target_mrad);
-            let off_mrad = exit_mrad.abs_diff(self.departure.exit_mrad.into()) as i32;
-            if off_mrad.min(2 * i32::from(HALF_TURN_MRAD) - off_mrad) > SAME_EXIT_MRAD {
-                self.departure.is_known = false;
+        if i32::from(self.target_mrad).abs() <= facing_mrad {
+            // With the sensors ahead dead the exit is not seen, and the estimate has to do.
+            let is_certain = seen.is_some() || facing_mrad > FACING_MRAD;
+            if is_certain {
+                // The way by which the robot came and the exit are tracked separately. When they do not agree, one of them is another opening.
+                let exit_mrad = counter_clockwise_mrad(self.entry_mrad, self.target_mrad);
+                let off_mrad = exit_mrad.abs_diff(self.departure.exit_mrad.into()) as i32;
+                if off_mrad.min(2 * i32::from(HALF_TURN_MRAD) - off_mrad) > SAME_EXIT_MRAD {
+                    self.departure.is_known = false;
+                }
             }
-            self.enter(DriveState::Depart);
-            return self.drive(scan, Sector::EXIT, None, seen.map(|_| self.target_mrad));
+            if is_certain || self.search_frames > SEARCH_FRAMES {
+                self.enter(DriveState::Depart);
+                return self.depart(scan, obstacles, true);
+            }
+            self.search_frames += 1;
+            return VelocityCommand { heading_mrad: Self::look_round_mrad(self.search_frames), speed_permille: 0 };
         }
         VelocityCommand { heading_mrad: self.target_mrad.clamp(-TURN_MRAD, TURN_MRAD), speed_permille: 0 }
     }
@@ -407,12 +497,21 @@ impl LocalPlanner {
         }
         if !is_at_place {
             self.enter(DriveState::FollowEdge);
+            if !self.is_homing {
+                self.gap_mm = u16::MAX;
+            }
             return self.follow_edge(scan, obstacles, is_at_place);
         }
+        if self.is_homing {
+            return self.drive_home(scan, None);
+        }
         // At a crossing, a sensor that should measure the obstacle beside the exit may measure the next one.
-        let seen = scan.openings(obstacles).nearest(self.target_mrad, EXIT_MRAD);
-        self.target_mrad = seen.map_or(self.target_mrad, |(_, target_mrad)| target_mrad);
-        self.drive(scan, Sector::EXIT, None, seen.map(|_| self.target_mrad))
+        let expected_mrad = rotated(self.target_mrad, if self.frames > 0 { self.rotation_mrad } else { 0 });
+        let seen = scan.openings(obstacles).nearest(expected_mrad, EXIT_MRAD);
+        self.target_mrad = seen.map_or(expected_mrad, |(_, target_mrad)| target_mrad);
+        let is_wide = seen.is_some() && scan.narrow_openings(obstacles).nearest(expected_mrad, EXIT_MRAD).is_none();
+        let sector = if is_wide { Sector::EXIT } else { Sector::DOOR };
+        self.drive(scan, sector, None, Some(self.target_mrad))
     }
 
     fn recover<const SONARS: usize>(&mut self, scan: &RingScan<'_, SONARS>) -> VelocityCommand {
@@ -430,6 +529,7 @@ impl LocalPlanner {
     fn give_up<const SONARS: usize>(&mut self, scan: &RingScan<'_, SONARS>) -> VelocityCommand {
         self.faults.record(FaultKind::DriveLost);
         self.departure = Departure::UNKNOWN;
+        (self.is_homing, self.gap_mm) = (false, 0);
         self.is_returning = false;
         let room_mm = self.config.clearance_mm.saturating_mul(2);
         self.target_mrad = widest_room_mrad(scan, room_mm).unwrap_or(HALF_TURN_MRAD);
@@ -443,9 +543,25 @@ impl LocalPlanner {
             return self.give_up(scan);
         }
         self.is_returning = true;
+        self.is_homing = false;
         self.target_mrad = HALF_TURN_MRAD;
         self.enter(DriveState::Recover);
         VelocityCommand { heading_mrad: self.target_mrad.clamp(-TURN_MRAD, TURN_MRAD), speed_permille: 0 }
+    }
+
+    /// Drives to the gap by which the robot came, between the obstacles beside it once they are nearer than those of the place.
+    fn drive_home<const SONARS: usize>(
+        &mut self,
+        scan: &RingScan<'_, SONARS>,
+        spread_mm: Option<u16>,
+    ) -> VelocityCommand {
+        // Near the estimated point its bearing is as uncertain as the point.
+        let home_mrad = if self.gap.length() < HOME_PERMILLE { 0 } else { self.gap.bearing_mrad() };
+        let is_near = |range_mm: u16| u32::from(range_mm) * 4 < u32::from(self.radius_mm) * 3;
+        let gap_mrad =
+            gap_ahead_mrad(scan, home_mrad).filter(|&(_, range_mm)| is_near(range_mm)).map(|(gap_mrad, _)| gap_mrad);
+        let sector = if beside_mm(scan, Sector::DOOR).is_some_and(is_near) { Sector::DOOR } else { Sector::NONE };
+        self.drive(scan, sector, spread_mm, Some(gap_mrad.unwrap_or(home_mrad)))
     }
 
     /// Drives along the edge between the obstacles in a sector, more slowly with a smaller spread. The heading is that of the exit
@@ -460,7 +576,7 @@ impl LocalPlanner {
         if nearest_ahead(scan).is_some_and(|ahead| ahead.range_mm < self.config.clearance_mm) {
             return self.turn_back(scan);
         }
-        let mut heading_mrad = edge_heading_mrad(scan, sector, self.config.look_ahead_mm).unwrap_or(0);
+        let mut heading_mrad = edge_heading_mrad(scan, sector, self.config.look_ahead_mm).or(exit_mrad).unwrap_or(0);
         if let Some(exit_mrad) = exit_mrad {
             let (least_mrad, most_mrad) = (exit_mrad.saturating_sub(ASIDE_MRAD), exit_mrad.saturating_add(ASIDE_MRAD));
             heading_mrad = heading_mrad.max(least_mrad).min(most_mrad);
@@ -479,6 +595,11 @@ impl LocalPlanner {
         let share = u32::from(self.config.speed_permille) * u32::from(room_mm);
         let share = share.checked_div(body_mm.into()).map_or(u16::MAX, |share| share as u16);
         share.max(APPROACH_PERMILLE.min(self.config.speed_permille))
+    }
+
+    /// Turns to either side by half the angle between two sensors, so that one of them looks through a narrow gap.
+    const fn look_round_mrad(frames: u16) -> i16 {
+        if (frames + LOOK_ROUND_FRAMES / 2) & LOOK_ROUND_FRAMES == 0 { LOOK_ROUND_MRAD } else { -LOOK_ROUND_MRAD }
     }
 
     /// With the sensors ahead dead, a swaying robot measures the range ahead with those beside them.

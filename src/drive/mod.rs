@@ -102,7 +102,7 @@ impl<const V: usize> Drive<V> {
     ) -> VelocityCommand {
         if let Some(place) = place {
             self.route_planner.arrive(filter);
-            self.local_planner.arrive(place.degree);
+            self.local_planner.arrive(place.ways);
         } else if self.local_planner.has_returned(detector.is_at_place()) {
             self.route_planner.refuse(filter);
             self.local_planner.arrive_again();

@@ -4,8 +4,14 @@
 //! paper). With unit vectors u and v towards obstacles at ranges r and s, a displacement δ of the robot changes r − s by
 //! −(u − v) · δ. The edge is therefore perpendicular to u − v, and a meet point is the δ that makes both differences 0.
 
-use crate::bearing::{UNIT, Vector, unit};
+use crate::bearing::{UNIT, Vector, rotated, turn_mrad, unit};
 use crate::place::{Obstacle, Obstacles, RingScan};
+use crate::ring::Echo;
+
+/// Ahead is within this angle of straight ahead, in milliradians.
+const AHEAD_MRAD: i32 = 1047;
+/// A wall is heard this far off its normal, in milliradians: silence nearer to the normal is a gap.
+const GAP_MRAD: i32 = 720;
 
 /// The sector in which the obstacle on the left is searched, counter-clockwise from the heading; mirrored on the right.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -19,6 +25,12 @@ impl Sector {
     pub(super) const EDGE: Self = Self { from_mrad: 350, to_mrad: 2790 };
     /// 20° to 115°: the two obstacles beside an exit of a meet point, without those behind.
     pub(super) const EXIT: Self = Self { from_mrad: 350, to_mrad: 2010 };
+    /// 20° to 75°: the two obstacles beside a door, without the walls beside the robot.
+    pub(super) const DOOR: Self = Self { from_mrad: 350, to_mrad: 1310 };
+    /// No obstacle.
+    pub(super) const NONE: Self = Self { from_mrad: 1, to_mrad: 0 };
+    /// 45° to 135°: the two obstacles between which the robot is.
+    pub(super) const BESIDE: Self = Self { from_mrad: 785, to_mrad: 2356 };
 }
 
 /// Heading to the point of the edge that is `look_ahead_mm` ahead, between the closest obstacles on the left and on the
@@ -32,11 +44,43 @@ pub(super) fn edge_heading_mrad<const SONARS: usize>(
     let left = scan.nearest(within);
     let right = scan.nearest(|bearing_mrad| within(bearing_mrad.saturating_neg()));
     match (left, right) {
+        (None, _) | (_, None) if sector == Sector::DOOR => None,
         (Some(left), Some(right)) => Some(heading_between_mrad(left, right, look_ahead_mm)),
         (Some(left), None) => Some(left.bearing_mrad.saturating_sub(1571)),
         (None, Some(right)) => Some(right.bearing_mrad.saturating_add(1571)),
         (None, None) => None,
     }
+}
+
+/// Mean range of the nearest obstacles on the left and on the right; `None` without an obstacle on one side.
+pub(super) fn beside_mm<const SONARS: usize>(scan: &RingScan<'_, SONARS>, sector: Sector) -> Option<u16> {
+    let within = |bearing_mrad: i16| (sector.from_mrad..=sector.to_mrad).contains(&bearing_mrad);
+    let left = scan.nearest(within)?;
+    let right = scan.nearest(|bearing_mrad| within(bearing_mrad.saturating_neg()))?;
+    Some(left.range_mm / 2 + right.range_mm / 2)
+}
+
+/// The gap in the wall ahead that is nearest to a bearing, and the range of the wall: the mean bearing of the sensors within 45° of
+/// the nearest echo ahead that measure more than 1.6 times its range, or silence, on the side of that bearing.
+pub(super) fn gap_ahead_mrad<const SONARS: usize>(
+    scan: &RingScan<'_, SONARS>,
+    towards_mrad: i16,
+) -> Option<(i16, u16)> {
+    let wall = scan.nearest(|bearing_mrad| i32::from(bearing_mrad).abs() < AHEAD_MRAD)?;
+    let is_left = turn_mrad(wall.bearing_mrad, towards_mrad) > 0;
+    let (mut count, mut sum_mrad) = (0i32, 0i32);
+    for (echo, bearing_mrad) in scan.echoes() {
+        let aside_mrad = turn_mrad(wall.bearing_mrad, bearing_mrad);
+        let is_open = match echo {
+            Echo::Dead => false,
+            Echo::Silence => true,
+            Echo::Range { range_mm } => u32::from(range_mm) * 5 > u32::from(wall.range_mm) * 8,
+        };
+        if is_open && (aside_mrad > 0) == is_left && aside_mrad.abs() < GAP_MRAD {
+            (count, sum_mrad) = (count + 1, sum_mrad + aside_mrad);
+        }
+    }
+    Some((rotated(wall.bearing_mrad, sum_mrad.checked_div(count)?), wall.range_mm))
 }
 
 /// Heading to the point of the edge between two obstacles that is `look_ahead_mm` ahead.
@@ -83,7 +127,7 @@ pub(super) fn meet_point_offset_mm(obstacles: &Obstacles) -> Option<Vector> {
 mod tests {
     use super::*;
     use crate::place::{PlaceConfig, PlaceDetector};
-    use crate::ring::{Echo, RingFrame, RingGeometry};
+    use crate::ring::{RingFrame, RingGeometry};
 
     /// A detector whose scan has these ranges, by sensor of an even ring; the other sensors receive no echo.
     fn detector(ranges_mm: &[(usize, u16)]) -> PlaceDetector<16> {
@@ -134,5 +178,20 @@ mod tests {
     fn two_obstacles_have_no_meet_point() {
         let obstacles = detector(&[(4, 820), (12, 780)]).scan().obstacles();
         assert_eq!(meet_point_offset_mm(&obstacles), None);
+    }
+
+    #[test]
+    fn a_door_in_the_wall_ahead_is_on_the_side_where_sensors_look_through() {
+        let wall = [(15, 720), (0, 700), (1, 1900), (2, 1050), (3, 1000), (13, 900)];
+        let (gap_mrad, wall_mm) = gap_ahead_mrad(&detector(&wall).scan(), 200).unwrap();
+        assert!((200..600).contains(&gap_mrad), "{gap_mrad}");
+        assert_eq!(wall_mm, 700);
+        assert_eq!(gap_ahead_mrad(&detector(&[(14, 760), (15, 720), (0, 700), (1, 720), (2, 760)]).scan(), 200), None);
+    }
+
+    #[test]
+    fn the_obstacles_beside_the_robot_are_measured_on_both_sides() {
+        assert_eq!(beside_mm(&detector(&[(4, 800), (12, 900)]).scan(), Sector::BESIDE), Some(850));
+        assert_eq!(beside_mm(&detector(&[(4, 800)]).scan(), Sector::BESIDE), None);
     }
 }

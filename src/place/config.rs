@@ -18,7 +18,7 @@ pub struct PlaceConfig {
     /// Spread above which the robot has left the meet point, in millimetres, at least `equidistance_mm`. Default 300.
     pub leave_mm: u16,
     /// Minimum angle between two obstacles, in milliradians, 1 to 2094. Default 1047 (60°). Echoes closer in bearing are one
-    /// obstacle.
+    /// obstacle, unless a sensor looks through between them.
     ///
     /// It must exceed the beam width plus the spacing of the sensors. Two corners of a junction must be farther apart.
     pub separation_mrad: u16,

@@ -2,9 +2,9 @@
 
 use super::implausible::Plausibility;
 use super::meet_point::MeetPoint;
-use super::openings::{MergedOpenings, Openings};
+use super::openings::{MergedOpenings, Openings, is_open};
 use super::rotation::RotationEstimate;
-use super::scan::RingScan;
+use super::scan::{Obstacle, Obstacles, RingScan};
 use super::smoothing::{DEAD_MM, RangeSmoother, SILENT_MM, bridge_dead_sensors};
 use super::{Fingerprint, PlaceConfig};
 use crate::bearing::{HALF_TURN_MRAD, rotated, turn_mrad};
@@ -16,6 +16,18 @@ use crate::ring::{Echo, RingFrame, RingGeometry};
 const AVERAGED_FRAMES: usize = 8;
 /// Only frames whose spread is at most this much above the smallest one are averaged, in millimetres.
 const AVERAGED_SPREAD_MM: u16 = 30;
+/// A door is an opening of a place when at least this many sightings show it: a sensor looks through only while it is in front.
+const DOOR_SIGHTINGS: u8 = 3;
+/// A place that is one only because a sensor looks through a door needs this many sightings: silence may be a missed echo.
+const DOOR_CONFIRM_SIGHTINGS: u8 = 8;
+/// After this many frames between obstacles on both sides, with none behind, the way by which the robot came is known.
+const CAME_BY_FRAMES: u8 = 4;
+/// Along an edge the robot turns by at most this between two frames, in milliradians.
+const STRAIGHT_MRAD: i32 = 80;
+/// The obstacles beside an edge are within these angles of straight ahead, in milliradians.
+const BESIDE_MRAD: core::ops::RangeInclusive<i32> = 785..=2356;
+/// Sensors within this angle of straight behind measure the range behind, in milliradians.
+const BEHIND_MRAD: i32 = 350;
 
 /// A place that the robot has visited: a meet point of the Voronoi graph.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -27,11 +39,11 @@ pub struct Place {
     /// Number of openings between the equidistant obstacles, 1 to 6, 1 at a dead end; `None` when fewer than three
     /// quarters of the averaged frames agree.
     ///
-    /// This is the degree of the vertex. An edge that ends within 1.6 times the radius is not counted, nor is one between
-    /// two obstacles closer in bearing than `separation_mrad`.
+    /// This is the degree of the vertex. An edge that ends within 1.6 times the radius is not counted. With a door, a way between
+    /// two obstacles closer in bearing than `separation_mrad`, it is the number of `ways`.
     pub degree: Option<u8>,
-    /// The bearings of the openings that at least half of the averaged frames show, in the frame in which the place is
-    /// reported. `degree` may be another number: it needs the agreement of more frames.
+    /// The bearings of the openings that at least half of the averaged frames show, and of the doors that three frames at the
+    /// place show, in the frame in which the place is reported. `degree` may be another number: it needs the agreement of more frames.
     pub ways: Openings,
     /// The direction from which the robot came: where straight behind was in the first frame that showed the meet point, as a
     /// bearing in the frame in which the place is reported.
@@ -63,7 +75,7 @@ impl Sighting {
 /// Detects places in the frames of a ring of `SONARS` sensors.
 ///
 /// Ranges are measured from the robot's centre: a ring of sensors on its rim adds the radius of the ring.
-/// Memory: about `12 · SONARS + 160` bytes. Time for each frame: at most six passes over the ring, `O(SONARS)` each; where most
+/// Memory: about `16 · SONARS + 200` bytes. Time for each frame: at most six passes over the ring, `O(SONARS)` each; where most
 /// sensors are dead, up to `O(SONARS²)`.
 #[derive(Clone, Debug)]
 pub struct PlaceDetector<const SONARS: usize> {
@@ -86,8 +98,16 @@ pub struct PlaceDetector<const SONARS: usize> {
     is_at_place: bool,
     /// Frames that showed the current meet point.
     sightings: u8,
+    /// Those that did so only because a sensor looks through a door.
+    door_sightings: u8,
     /// `turned_mrad` in the first of them.
     first_turned_mrad: i16,
+    /// The bearing of the way by which the robot came,
+    came_by_mrad: i16,
+    /// and the number of frames that showed it, up to [`CAME_BY_FRAMES`], when it is known.
+    came_by_frames: u8,
+    /// The doors in the sightings, with bearings at the start.
+    doors: MergedOpenings,
     /// Frames that contradict the present state minus frames that confirm it, at least 0.
     contrary_frames: u8,
     /// The sightings with the smallest spread, best first.
@@ -112,7 +132,11 @@ impl<const SONARS: usize> PlaceDetector<SONARS> {
             turned_mrad: 0,
             is_at_place: false,
             sightings: 0,
+            door_sightings: 0,
             first_turned_mrad: 0,
+            came_by_mrad: 0,
+            came_by_frames: 0,
+            doors: MergedOpenings::new(),
             contrary_frames: 0,
             best: [Sighting::UNSET; AVERAGED_FRAMES],
             faults: FaultCounters::new(),
@@ -150,6 +174,7 @@ impl<const SONARS: usize> PlaceDetector<SONARS> {
         self.rotation = RotationEstimate::new();
         self.turned_mrad = 0;
         self.is_at_place = false;
+        self.came_by_frames = 0;
         self.faults = FaultCounters::new();
         self.forget_sightings();
         Ok(())
@@ -187,15 +212,17 @@ impl<const SONARS: usize> PlaceDetector<SONARS> {
             self.faults.record(FaultKind::RingBlind);
             return None;
         }
-        let obstacles = self.scan().obstacles();
+        let heard = self.scan().heard_obstacles();
         self.rotation.update(&self.smooth_mm, &self.geometry);
         self.turned_mrad = rotated(self.turned_mrad, self.rotation.rotation_mrad());
-        let meet_point = self.scan().meet_point(&obstacles);
+        self.track_way(&heard);
         if self.is_at_place {
-            self.wait_for_departure(meet_point);
+            self.wait_for_departure(heard.spread_mm().unwrap_or(u16::MAX));
             return None;
         }
-        self.confirm(Sighting { meet_point, frame_index, turned_mrad: self.turned_mrad })
+        let obstacles = self.scan().beside_way(heard);
+        let meet_point = self.scan().meet_point(&obstacles);
+        self.confirm(Sighting { meet_point, frame_index, turned_mrad: self.turned_mrad }, &obstacles)
     }
 
     /// Returns the newest frame, smoothed.
@@ -205,6 +232,7 @@ impl<const SONARS: usize> PlaceDetector<SONARS> {
             geometry: &self.geometry,
             separation_mrad: self.config.separation_mrad,
             equidistance_mm: self.config.equidistance_mm,
+            came_by_mrad: if self.came_by_frames >= CAME_BY_FRAMES { Some(self.came_by_mrad) } else { None },
         }
     }
 
@@ -233,6 +261,11 @@ impl<const SONARS: usize> PlaceDetector<SONARS> {
         }
     }
 
+    /// Announces that the robot may be elsewhere: the way by which it came is unknown.
+    pub const fn forget_way(&mut self) {
+        self.came_by_frames = 0;
+    }
+
     /// Faults since the start: blind frames, ranges out of range, radii that no fingerprint represents.
     pub const fn faults(&self) -> &FaultCounters {
         &self.faults
@@ -256,33 +289,66 @@ impl<const SONARS: usize> PlaceDetector<SONARS> {
         ranges_mm
     }
 
+    /// Follows the way by which the robot came. Along an edge it is straight behind; from the first sighting of a meet point it is
+    /// where the rotation of the ring brings it.
+    fn track_way(&mut self, obstacles: &Obstacles) {
+        self.came_by_mrad = rotated(self.came_by_mrad, self.rotation.rotation_mrad());
+        if self.is_at_place || self.sightings > 0 {
+            return;
+        }
+        let mut nearest = obstacles.iter();
+        let (Some(one), Some(other)) = (nearest.next(), nearest.next()) else { return };
+        let is_beside = |obstacle: &Obstacle| BESIDE_MRAD.contains(&i32::from(obstacle.bearing_mrad).abs());
+        let is_between = is_beside(one) && is_beside(other) && (one.bearing_mrad < 0) != (other.bearing_mrad < 0);
+        let is_behind = |bearing_mrad: i16| turn_mrad(HALF_TURN_MRAD, bearing_mrad).abs() <= BEHIND_MRAD;
+        let is_open = self.scan().nearest(is_behind).is_none_or(|behind| is_open(behind.range_mm, other.range_mm));
+        let is_edge = other.range_mm.saturating_sub(one.range_mm) <= self.config.equidistance_mm;
+        let is_straight = self.rotation.rotation_mrad().abs() <= STRAIGHT_MRAD;
+        let is_known = self.came_by_frames >= CAME_BY_FRAMES;
+        if is_between && is_edge && is_straight && (is_open || is_known) {
+            if !is_known {
+                self.came_by_frames += 1;
+            }
+            self.came_by_mrad = HALF_TURN_MRAD;
+        } else if turn_mrad(HALF_TURN_MRAD, self.came_by_mrad).abs() > 1571 {
+            self.came_by_frames = 0;
+        }
+    }
+
     /// At a reported place: counts the frames that show a departure.
-    fn wait_for_departure(&mut self, meet_point: MeetPoint) {
-        if meet_point.spread_mm >= self.config.leave_mm {
+    fn wait_for_departure(&mut self, spread_mm: u16) {
+        if spread_mm >= self.config.leave_mm {
             self.contrary_frames = self.contrary_frames.saturating_add(1);
         } else {
             self.contrary_frames = self.contrary_frames.saturating_sub(1);
         }
         if self.contrary_frames >= self.config.leave_frames {
             self.is_at_place = false;
+            self.came_by_frames = CAME_BY_FRAMES;
+            self.came_by_mrad = HALF_TURN_MRAD;
             self.forget_sightings();
         }
     }
 
     /// Between places: collects the frames that show a meet point, and returns the place when it is complete.
-    fn confirm(&mut self, sighting: Sighting) -> Option<Place> {
+    fn confirm(&mut self, sighting: Sighting, obstacles: &Obstacles) -> Option<Place> {
         if sighting.meet_point.spread_mm <= self.config.equidistance_mm {
             if self.sightings == 0 {
                 self.first_turned_mrad = self.turned_mrad;
             }
             self.sightings = self.sightings.saturating_add(1);
+            self.door_sightings = self.door_sightings.saturating_add(obstacles.is_at_door().into());
             self.contrary_frames = self.contrary_frames.saturating_sub(1);
+            let doors = self.scan().narrow_openings(obstacles);
+            self.doors.add(&doors, turn_mrad(self.turned_mrad, 0));
             self.insert(sighting);
         } else if self.sightings > 0 {
             self.contrary_frames = self.contrary_frames.saturating_add(1);
         }
         let is_over = self.contrary_frames >= self.config.leave_frames;
-        if self.sightings < self.config.confirm_frames {
+        let is_confirmed = self.sightings.saturating_sub(self.door_sightings) >= self.config.confirm_frames
+            || self.sightings >= DOOR_CONFIRM_SIGHTINGS.max(self.config.confirm_frames);
+        if !is_confirmed {
             if is_over {
                 self.forget_sightings();
             }
@@ -310,7 +376,9 @@ impl<const SONARS: usize> PlaceDetector<SONARS> {
     /// Announces that the robot is not on the Voronoi graph: what it has seen of a meet point is void.
     pub fn forget_sightings(&mut self) {
         self.best = [Sighting::NONE; AVERAGED_FRAMES];
+        self.doors = MergedOpenings::new();
         self.sightings = 0;
+        self.door_sightings = 0;
         self.contrary_frames = 0;
     }
 
@@ -334,9 +402,19 @@ impl<const SONARS: usize> PlaceDetector<SONARS> {
         close.for_each(|sighting| {
             ways.add(&sighting.meet_point.openings, turn_mrad(sighting.turned_mrad, self.turned_mrad));
         });
+        let mut ways = ways.agreed();
+        let mut degree = degree;
+        let doors = self.doors.shown_by(DOOR_SIGHTINGS);
+        for &bearing_mrad in doors.bearings_mrad() {
+            let bearing_mrad = rotated(bearing_mrad, self.turned_mrad.into());
+            ways.insert(bearing_mrad);
+        }
+        if doors.count() > 0 {
+            degree = Some(ways.count());
+        }
         let behind_mrad = rotated(HALF_TURN_MRAD, turn_mrad(self.first_turned_mrad, self.turned_mrad));
         let (frame_index, spread_mm) = (best.frame_index, best.meet_point.spread_mm);
-        Some(Place { fingerprint, frame_index, degree, ways: ways.agreed(), behind_mrad, spread_mm })
+        Some(Place { fingerprint, frame_index, degree, ways, behind_mrad, spread_mm })
     }
 }
 

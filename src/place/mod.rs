@@ -9,7 +9,7 @@
 //! | Smooth the ranges of each sensor; fill in dead sensors | `smoothing.rs` |
 //! | Find the closest obstacles in separate bearings | `scan.rs` ([`RingScan`], [`Obstacles`]) |
 //! | Find the openings between them | `openings.rs` ([`Openings`]) |
-//! | Estimate the rotation from frame to frame | `rotation.rs` |
+//! | Estimate the rotation from frame to frame, and while the robot stands | `rotation.rs` |
 //! | Confirm a meet point over several frames and report it once | `detector.rs` ([`PlaceDetector`]) |
 //! | Quantise its radius (Eq. 1) | `fingerprint.rs` ([`Fingerprint`]) |
 //!
@@ -17,6 +17,9 @@
 //! point and rises again behind it. A frame whose spread is at most `equidistance_mm` shows a meet point. After
 //! `confirm_frames` of them the meet point is confirmed. When the following frames no longer show it, or after
 //! `settle_frames`, the place is reported. The next meet point is searched after the spread has risen above `leave_mm`.
+//!
+//! A door is a junction although it is narrower than the cone of a sonar: a sensor looks through between its jambs, or the robot came by it
+//! (`scan.rs`).
 //!
 //! The radius and the bearings of the ways are averaged over up to eight frames with the smallest spread. While the robot approaches the third obstacle
 //! it moves away from the first two, so the mean range changes little near the meet point and averaging adds little bias.

@@ -9,6 +9,9 @@ use crate::top_k::TopK;
 /// 1.41 times the radius of the inscribed disc.
 const OPEN_PERCENT: u32 = 160;
 
+/// The corners beside a wall that ends an opening are nearer than this percentage of the radius.
+const FAR_PERCENT: u32 = 220;
+
 /// Openings of two scans within this angle are the same, in milliradians.
 const SAME_OPENING_MRAD: i32 = 500;
 /// The most different openings of the merged scans.
@@ -32,6 +35,13 @@ impl Openings {
     /// Bearings in milliradians in ascending order: counter-clockwise from straight behind.
     pub fn bearings_mrad(&self) -> &[i16] {
         self.bearings_mrad.as_slice()
+    }
+
+    /// Inserts an opening that is none of those present.
+    pub(super) fn insert(&mut self, bearing_mrad: i16) {
+        if self.nearest(bearing_mrad, SAME_OPENING_MRAD as u16).is_none() {
+            self.bearings_mrad.insert(bearing_mrad, |one, other| one <= other);
+        }
     }
 
     /// Index and bearing of the opening closest to `bearing_mrad`; `None` when none is within `within_mrad` of it.
@@ -75,9 +85,14 @@ impl MergedOpenings {
 
     /// The openings that at least half of the scans show.
     pub(super) fn agreed(&self) -> Openings {
+        self.shown_by(self.scans.div_ceil(2).max(1))
+    }
+
+    /// The openings that at least this many scans show.
+    pub(super) fn shown_by(&self, least: u8) -> Openings {
         let mut bearings_mrad = TopK::new(0);
         for &(mean_mrad, scans) in &self.openings {
-            if scans > 0 && scans.saturating_mul(2) >= self.scans {
+            if scans >= least {
                 bearings_mrad.insert(mean_mrad, |one, other| one <= other);
             }
         }
@@ -90,8 +105,20 @@ impl<const SONARS: usize> RingScan<'_, SONARS> {
     ///
     /// A gap between two obstacles is open when a sensor in it measures more than 1.6 times the mean range of the
     /// equidistant obstacles, or silence. The bearing of the opening is the mean of these sensors' bearings. A corridor
-    /// that ends within 1.6 times that range is not an opening. Time `O(SONARS)` for each obstacle.
+    /// that ends within 1.6 times that range is not an opening, nor is a wall between two corners that are nearer than 2.2 times
+    /// that range. The gap with the way by which the robot came is open, whatever
+    /// the sonars measure. Time `O(SONARS)` for each obstacle.
     pub fn openings(&self, obstacles: &Obstacles) -> Openings {
+        self.gaps(obstacles, 0)
+    }
+
+    /// The openings between two obstacles that are less than `separation_mrad` apart, as a door.
+    pub(crate) fn narrow_openings(&self, obstacles: &Obstacles) -> Openings {
+        self.gaps(obstacles, self.separation_mrad)
+    }
+
+    /// The openings of the gaps that are narrower than `narrow_mrad`, or of all gaps if it is 0.
+    fn gaps(&self, obstacles: &Obstacles, narrow_mrad: u16) -> Openings {
         let mut bearings_mrad = TopK::new(0);
         let radius_mm = obstacles.radius_mm();
         let bearings = obstacles.equidistant().map(|obstacle| obstacle.bearing_mrad);
@@ -101,14 +128,31 @@ impl<const SONARS: usize> RingScan<'_, SONARS> {
                 (gap_mrad > 0).then_some(gap_mrad)
             });
             let gap_mrad = gap_mrad.min().unwrap_or(2 * i32::from(HALF_TURN_MRAD));
-            let open = self.ranges().filter_map(|(range_mm, bearing_mrad)| {
+            if narrow_mrad > 0 && gap_mrad >= narrow_mrad.into() {
+                continue;
+            }
+            let inside_mrad = |bearing_mrad: i16| {
                 let within_mrad = counter_clockwise_mrad(from_mrad, bearing_mrad);
-                let is_within = within_mrad > 0 && within_mrad < gap_mrad;
-                (range_mm != DEAD_MM && is_within && is_open(range_mm, radius_mm)).then_some(within_mrad)
+                (within_mrad > 0 && within_mrad < gap_mrad).then_some(within_mrad)
+            };
+            let inside = || {
+                self.ranges().filter_map(|(range_mm, bearing_mrad)| {
+                    let within_mrad = inside_mrad(bearing_mrad)?;
+                    (range_mm != DEAD_MM).then_some((range_mm, within_mrad))
+                })
+            };
+            let open = inside().filter(|&(range_mm, _)| is_open(range_mm, radius_mm));
+            let mut sensors = OpenSensors { count: 0, sum_mrad: 0, first_mrad: gap_mrad, last_mrad: 0, is_far: false };
+            open.for_each(|(range_mm, within_mrad)| {
+                sensors.add(within_mrad, is_beyond(FAR_PERCENT, range_mm, radius_mm))
             });
-            let (count, sum_mrad) =
-                open.fold((0i32, 0i32), |(count, sum), within_mrad| (count + 1, sum.saturating_add(within_mrad)));
-            if let Some(middle_mrad) = sum_mrad.checked_div(count) {
+            let is_wall = inside().any(|(range_mm, within_mrad)| {
+                sensors.first_mrad < within_mrad && within_mrad < sensors.last_mrad && !is_open(range_mm, radius_mm)
+            });
+            let is_closed = is_wall && !sensors.is_far;
+            let middle_mrad = sensors.sum_mrad.checked_div(if is_closed { 0 } else { sensors.count });
+            let middle_mrad = middle_mrad.or_else(|| inside_mrad(self.came_by_mrad?));
+            if let Some(middle_mrad) = middle_mrad {
                 bearings_mrad.insert(rotated(from_mrad, middle_mrad), |one, other| one <= other);
             }
         }
@@ -116,7 +160,31 @@ impl<const SONARS: usize> RingScan<'_, SONARS> {
     }
 }
 
+/// The sensors that look into an opening.
+struct OpenSensors {
+    count: i32,
+    sum_mrad: i32,
+    first_mrad: i32,
+    last_mrad: i32,
+    /// Whether one of them looks farther than a corner of the room is.
+    is_far: bool,
+}
+
+impl OpenSensors {
+    fn add(&mut self, within_mrad: i32, is_far: bool) {
+        self.count = self.count.saturating_add(1);
+        self.sum_mrad = self.sum_mrad.saturating_add(within_mrad);
+        self.first_mrad = self.first_mrad.min(within_mrad);
+        self.last_mrad = self.last_mrad.max(within_mrad);
+        self.is_far |= is_far;
+    }
+}
+
 /// Whether a range is too long for a corner between two equidistant walls.
-fn is_open(range_mm: u16, radius_mm: u16) -> bool {
-    u32::from(range_mm) * 100 > u32::from(radius_mm) * OPEN_PERCENT
+pub(super) fn is_open(range_mm: u16, radius_mm: u16) -> bool {
+    is_beyond(OPEN_PERCENT, range_mm, radius_mm)
+}
+
+fn is_beyond(percent: u32, range_mm: u16, radius_mm: u16) -> bool {
+    u32::from(range_mm) * 100 > u32::from(radius_mm) * percent
 }

@@ -1,5 +1,6 @@
 //! One smoothed reading of the ring, and the closest obstacles in it, in separate bearings.
 
+use super::openings::is_open;
 use super::smoothing::{DEAD_MM, SILENT_MM, is_echo};
 use crate::bearing::{rotated, turn_mrad};
 use crate::ring::{Echo, RingGeometry};
@@ -7,6 +8,16 @@ use crate::ring::{Echo, RingGeometry};
 /// Where the neighbour of an echo measures this percentage of its range, both echoes come from one wall, seen at an angle:
 /// nearer by more than noise, and by less than a separate object in front of a wall.
 const SLANTED_WALL_PERCENT: core::ops::Range<u32> = 67..92;
+
+/// An obstacle within this angle of a way is in it: half the cone of a sonar and half the angle between two sensors, in
+/// milliradians.
+const IN_WAY_MRAD: i32 = 450;
+/// Two obstacles within this angle of a way are those beside it, in milliradians.
+const BESIDE_WAY_MRAD: i32 = 1100;
+/// An obstacle more than this angle from a way is opposite to it, in milliradians.
+const OPPOSITE_MRAD: i32 = 2094;
+/// The obstacles beside a way that is narrower than the cone of a sonar are at most this far from it, in milliradians.
+const JAMB_MRAD: i32 = 350;
 
 /// A smoothed reading of the whole ring, in ascending order of bearing. [`PlaceDetector::scan`] returns it.
 ///
@@ -37,6 +48,8 @@ pub struct RingScan<'a, const SONARS: usize> {
     pub(super) geometry: &'a RingGeometry<SONARS>,
     pub(super) separation_mrad: u16,
     pub(super) equidistance_mm: u16,
+    /// The bearing of the way by which the robot came, where it is known.
+    pub(super) came_by_mrad: Option<i16>,
 }
 
 /// An obstacle of a scan.
@@ -55,6 +68,9 @@ pub struct Obstacles {
     obstacles: [Obstacle; Self::MAX],
     len: usize,
     equidistant: usize,
+    spread_mm: Option<u16>,
+    /// Whether there are three equidistant obstacles only because a sensor looks through between two of them.
+    is_at_door: bool,
 }
 
 impl Obstacles {
@@ -72,7 +88,20 @@ impl Obstacles {
     }
 
     /// Range of the third closest obstacle minus the range of the closest, in millimetres; `None` with fewer than three.
-    pub fn spread_mm(&self) -> Option<u16> {
+    ///
+    /// Two obstacles beside a gap narrower than `separation_mrad` count as two only at a junction or an end: with exactly two ways
+    /// the robot is on an edge that passes through a door.
+    pub const fn spread_mm(&self) -> Option<u16> {
+        self.spread_mm
+    }
+
+    /// Whether there are three equidistant obstacles only because a sensor looks through between two of them, as through a door.
+    pub const fn is_at_door(&self) -> bool {
+        self.is_at_door
+    }
+
+    /// Range of the third closest obstacle minus the range of the closest.
+    fn third_spread_mm(&self) -> Option<u16> {
         match (self.iter().next(), self.iter().nth(2)) {
             (Some(first), Some(third)) => Some(third.range_mm.saturating_sub(first.range_mm)),
             _ => None,
@@ -83,6 +112,27 @@ impl Obstacles {
     pub fn radius_mm(&self) -> u16 {
         let sum_mm: u32 = self.equidistant().map(|obstacle| u32::from(obstacle.range_mm)).sum();
         sum_mm.checked_div(self.equidistant as u32).unwrap_or(0) as u16
+    }
+
+    /// Counts the only equidistant obstacle in a way as the two obstacles beside it: the robot came by that way, so it is no wall.
+    fn split(&mut self, way_mrad: i16) {
+        let off_mrad = |obstacle: &Obstacle| turn_mrad(way_mrad, obstacle.bearing_mrad).abs();
+        let is_beside = |obstacle: &&Obstacle| off_mrad(obstacle) < BESIDE_WAY_MRAD;
+        let Some(index) = self.equidistant().position(|obstacle| off_mrad(obstacle) < IN_WAY_MRAD) else { return };
+        if self.equidistant().filter(is_beside).count() > 1 || self.len >= Self::MAX {
+            return;
+        }
+        let Some(&obstacle) = self.obstacles.get(index) else { return };
+        let jamb = |aside_mrad| Obstacle { bearing_mrad: rotated(way_mrad, aside_mrad), ..obstacle };
+        let mut carried = jamb(-JAMB_MRAD);
+        for (place, slot) in self.obstacles.iter_mut().enumerate().skip(index) {
+            core::mem::swap(slot, &mut carried);
+            if place == index {
+                carried = jamb(JAMB_MRAD);
+            }
+        }
+        self.len += 1;
+        self.equidistant += 1;
     }
 }
 
@@ -112,21 +162,64 @@ impl<const SONARS: usize> RingScan<'_, SONARS> {
         echoes.min_by_key(|(range_mm, _)| *range_mm).map(|echo| self.obstacle(echo))
     }
 
-    /// Finds the closest obstacles: first the nearest echo, then repeatedly the nearest echo at least `separation_mrad`
-    /// from all obstacles before.
+    /// Finds the closest obstacles: first the nearest echo, then repeatedly the nearest echo apart from all obstacles before: at
+    /// least `separation_mrad` from them, or beyond a sensor that looks through between them, as through a door.
+    ///
+    /// An obstacle straight behind, in the way by which the robot came, is counted as the two obstacles beside that way.
     ///
     /// Time `O(SONARS)` for each of at most six obstacles; up to `O(SONARS²)` where most sensors are dead.
     pub fn obstacles(&self) -> Obstacles {
-        let mut closest = Obstacles { obstacles: [Obstacle::default(); Obstacles::MAX], len: 0, equidistant: 0 };
+        self.beside_way(self.heard_obstacles())
+    }
+
+    /// Counts an obstacle in the way by which the robot came as the two obstacles beside it.
+    pub(super) fn beside_way(&self, heard: Obstacles) -> Obstacles {
+        let Some(came_by_mrad) = self.came_by_mrad else { return heard };
+        let mut obstacles = heard;
+        obstacles.split(came_by_mrad);
+        if obstacles.equidistant > heard.equidistant && self.is_joined(came_by_mrad, &obstacles) {
+            obstacles.spread_mm = obstacles.third_spread_mm();
+        }
+        obstacles
+    }
+
+    /// Whether a narrow way is at a meet point: it joins others, or an obstacle is opposite to it. Otherwise the robot passes it.
+    fn is_joined(&self, way_mrad: i16, obstacles: &Obstacles) -> bool {
+        let is_opposite = |obstacle: &Obstacle| turn_mrad(way_mrad, obstacle.bearing_mrad).abs() > OPPOSITE_MRAD;
+        obstacles.equidistant().any(is_opposite) || self.openings(obstacles).count() > 2
+    }
+
+    /// The closest obstacles as the sonars hear them.
+    pub(super) fn heard_obstacles(&self) -> Obstacles {
+        let mut obstacles = self.closest(|index, bearing_mrad, found| self.is_apart(index, bearing_mrad, found));
+        let gap = |one: &Obstacle| {
+            let turns = obstacles.equidistant().map(|other| turn_mrad(one.bearing_mrad, other.bearing_mrad));
+            turns.filter(|&turn_mrad| turn_mrad > 0 && !self.separates(turn_mrad)).min()
+        };
+        let first = obstacles.equidistant().find_map(|one| Some(rotated(one.bearing_mrad, gap(one)? / 2)));
+        if let Some(gap_mrad) = first {
+            let apart = self.closest(|_, bearing_mrad, found| self.is_separate(bearing_mrad, found));
+            obstacles.is_at_door = apart.equidistant < 3;
+            if !self.is_joined(gap_mrad, &obstacles) {
+                obstacles.spread_mm = apart.spread_mm;
+            }
+        }
+        obstacles
+    }
+
+    /// The closest obstacles that are apart from each other, up to the first that is not equidistant.
+    fn closest(&self, is_apart: impl Fn(usize, i16, &[Obstacle]) -> bool) -> Obstacles {
+        let mut closest = Obstacles {
+            obstacles: [Obstacle::default(); Obstacles::MAX],
+            len: 0,
+            equidistant: 0,
+            spread_mm: None,
+            is_at_door: false,
+        };
         let mut nearest_mm = None;
         for number in 0..Obstacles::MAX {
-            let found = closest.obstacles.iter().take(number);
-            let apart = |bearing_mrad: i16| {
-                found.clone().all(|obstacle| {
-                    turn_mrad(obstacle.bearing_mrad, bearing_mrad).abs() >= i32::from(self.separation_mrad)
-                })
-            };
-            let Some(next) = self.nearest_apart(apart) else { break };
+            let found = closest.obstacles.get(..number).unwrap_or(&[]);
+            let Some(next) = self.nearest_apart(found, &is_apart) else { break };
             let nearest_mm = *nearest_mm.get_or_insert(next.range_mm);
             if let Some(slot) = closest.obstacles.get_mut(number) {
                 *slot = next;
@@ -138,6 +231,7 @@ impl<const SONARS: usize> RingScan<'_, SONARS> {
                 break;
             }
         }
+        closest.spread_mm = closest.third_spread_mm();
         closest
     }
 
@@ -146,29 +240,68 @@ impl<const SONARS: usize> RingScan<'_, SONARS> {
         self.ranges_mm.iter().copied().zip(self.geometry.bearings_mrad.iter().copied())
     }
 
-    /// The obstacle of the nearest echo that `is_apart` accepts and that does not belong to a wall found before.
-    fn nearest_apart(&self, is_apart: impl Fn(i16) -> bool) -> Option<Obstacle> {
+    /// The obstacle of the nearest echo that is apart from those found before and does not belong to a wall among them.
+    fn nearest_apart(
+        &self,
+        found: &[Obstacle],
+        is_apart: impl Fn(usize, i16, &[Obstacle]) -> bool,
+    ) -> Option<Obstacle> {
         let mut nearest = None;
         for (index, (range_mm, bearing_mrad)) in self.ranges().enumerate() {
-            let extends = |step| self.extends_wall(index, range_mm, step, &is_apart);
+            let extends = |step| self.extends_wall(index, range_mm, step, found);
             // The cheapest condition that rejects most echoes comes first.
             let is_nearer = is_echo(range_mm) && nearest.is_none_or(|(nearest_mm, _)| range_mm < nearest_mm);
-            if is_nearer && is_apart(bearing_mrad) && !extends(1) && !extends(SONARS - 1) {
+            if is_nearer && is_apart(index, bearing_mrad, found) && !extends(1) && !extends(SONARS - 1) {
                 nearest = Some((range_mm, bearing_mrad));
             }
         }
         nearest.map(|echo| self.obstacle(echo))
     }
 
+    /// Whether a bearing is at least `separation_mrad` from all obstacles.
+    fn is_separate(&self, bearing_mrad: i16, found: &[Obstacle]) -> bool {
+        found.iter().all(|obstacle| self.separates(turn_mrad(obstacle.bearing_mrad, bearing_mrad)))
+    }
+
+    const fn separates(&self, turn_mrad: i32) -> bool {
+        turn_mrad.abs() >= self.separation_mrad as i32
+    }
+
+    /// Whether an echo comes from none of the obstacles.
+    fn is_apart(&self, index: usize, bearing_mrad: i16, found: &[Obstacle]) -> bool {
+        found.iter().all(|obstacle| {
+            let turn_mrad = turn_mrad(obstacle.bearing_mrad, bearing_mrad);
+            self.separates(turn_mrad) || self.is_beyond_gap(index, turn_mrad, *obstacle)
+        })
+    }
+
+    /// Whether the next live sensor towards the obstacle, `turn_mrad` away, looks past it: it measures more than 1.6 times the
+    /// obstacle's range, or silence.
+    fn is_beyond_gap(&self, index: usize, turn_to_mrad: i32, obstacle: Obstacle) -> bool {
+        let step = if turn_to_mrad > 0 { SONARS - 1 } else { 1 };
+        self.next_live(index, step).is_some_and(|(other_mm, other_mrad)| {
+            let turn_other_mrad = turn_mrad(obstacle.bearing_mrad, other_mrad);
+            let is_between = turn_other_mrad != 0
+                && turn_other_mrad.signum() == turn_to_mrad.signum()
+                && turn_other_mrad.abs() < turn_to_mrad.abs();
+            is_between && is_open(other_mm, obstacle.range_mm)
+        })
+    }
+
+    /// The next live sensor in steps of `step` sensors round the ring.
+    fn next_live(&self, index: usize, step: usize) -> Option<(u16, i16)> {
+        let neighbours = (1..SONARS).map(|steps| (index + steps * step) % SONARS);
+        let mut ranges = neighbours
+            .filter_map(|index| Some((*self.ranges_mm.get(index)?, *self.geometry.bearings_mrad.get(index)?)));
+        ranges.find(|&(other_mm, _)| other_mm != DEAD_MM)
+    }
+
     /// Whether an echo belongs to a wall that was found before and is seen at an angle: the next live sensor, in steps of
     /// `step` sensors round the ring, belongs to that wall and measures a shorter range.
-    fn extends_wall(&self, index: usize, range_mm: u16, step: usize, is_apart: impl Fn(i16) -> bool) -> bool {
-        let neighbours = (1..SONARS).map(|steps| (index + steps * step) % SONARS);
-        let mut live =
-            neighbours.filter_map(|index| self.ranges().nth(index)).filter(|&(other_mm, _)| other_mm != DEAD_MM);
-        live.next().is_some_and(|(other_mm, bearing_mrad)| {
+    fn extends_wall(&self, index: usize, range_mm: u16, step: usize, found: &[Obstacle]) -> bool {
+        self.next_live(index, step).is_some_and(|(other_mm, bearing_mrad)| {
             let share_percent = (u32::from(other_mm) * 100).checked_div(range_mm.into()).unwrap_or(0);
-            !is_apart(bearing_mrad) && SLANTED_WALL_PERCENT.contains(&share_percent)
+            !self.is_separate(bearing_mrad, found) && SLANTED_WALL_PERCENT.contains(&share_percent)
         })
     }
 
@@ -198,7 +331,7 @@ mod tests {
     const EIGHT: RingGeometry<8> = RingGeometry::even();
 
     fn scan(ranges_mm: &[u16; 8], separation_mrad: u16) -> RingScan<'_, 8> {
-        RingScan { ranges_mm, geometry: &EIGHT, separation_mrad, equidistance_mm: 100 }
+        RingScan { ranges_mm, geometry: &EIGHT, separation_mrad, equidistance_mm: 100, came_by_mrad: None }
     }
 
     #[test]
@@ -254,11 +387,109 @@ mod tests {
         {
             ranges_mm[index] = range_mm;
         }
-        let scan = RingScan { ranges_mm: &ranges_mm, geometry: &ring, separation_mrad: 1047, equidistance_mm: 150 };
+        let scan = |ranges_mm| RingScan {
+            ranges_mm,
+            geometry: &ring,
+            separation_mrad: 1047,
+            equidistance_mm: 150,
+            came_by_mrad: None,
+        };
+        let scan = scan(&ranges_mm);
         assert_eq!(scan.obstacles().iter().count(), 2, "{:?}", scan.obstacles());
         // The same echo without an echo beside it is a separate obstacle.
         ranges_mm[3] = SILENT_MM;
-        let scan = RingScan { ranges_mm: &ranges_mm, geometry: &ring, separation_mrad: 1047, equidistance_mm: 150 };
+        let scan = |ranges_mm| RingScan {
+            ranges_mm,
+            geometry: &ring,
+            separation_mrad: 1047,
+            equidistance_mm: 150,
+            came_by_mrad: None,
+        };
+        let scan = scan(&ranges_mm);
         assert_eq!(scan.obstacles().iter().count(), 3, "{:?}", scan.obstacles());
+    }
+
+    fn scan_of_16<'a>(
+        ranges_mm: &'a [u16; 16],
+        ring: &'a RingGeometry<16>,
+        came_by_mrad: Option<i16>,
+    ) -> RingScan<'a, 16> {
+        RingScan { ranges_mm, geometry: ring, separation_mrad: 1047, equidistance_mm: 150, came_by_mrad }
+    }
+
+    /// The ranges of a ring of 16 by sensor, counter-clockwise from straight ahead; the others are silent.
+    fn ranges(heard_mm: &[(usize, u16)]) -> [u16; 16] {
+        let mut ranges_mm = [SILENT_MM; 16];
+        heard_mm.iter().for_each(|&(sensor, range_mm)| ranges_mm[sensor] = range_mm);
+        ranges_mm
+    }
+
+    #[test]
+    fn a_door_closer_than_the_separation_is_a_junction_where_a_sensor_looks_through() {
+        // In a corridor 2 m wide, in front of a door of 0.8 m on the left.
+        let ring = RingGeometry::even();
+        let mut ranges_mm = ranges(&[(3, 1045), (4, 4500), (5, 1040), (11, 975), (12, 960), (13, 970)]);
+        let scan = scan_of_16(&ranges_mm, &ring, None);
+        let meet_point = scan.meet_point(&scan.obstacles());
+        assert!(meet_point.spread_mm <= 100, "{meet_point:?}");
+        assert_eq!(meet_point.openings.count(), 3);
+        assert_eq!(scan.narrow_openings(&scan.obstacles()).bearings_mrad(), [1571]);
+        // A niche of 0.4 m.
+        ranges_mm[4] = 1400;
+        let scan = scan_of_16(&ranges_mm, &ring, None);
+        assert_eq!(scan.obstacles().spread_mm(), None);
+    }
+
+    #[test]
+    fn an_obstacle_in_the_way_by_which_the_robot_came_is_the_two_beside_it() {
+        // Out of a door, 1 m in front of the opposite wall of a corridor: one sonar hears both jambs.
+        let ring = RingGeometry::even();
+        let ranges_mm = ranges(&[(0, 1000), (1, 1010), (15, 1015), (8, 1040), (7, 1060), (9, 1065)]);
+        let scan = scan_of_16(&ranges_mm, &ring, None);
+        assert_eq!(scan.obstacles().spread_mm(), None);
+        let scan = scan_of_16(&ranges_mm, &ring, Some(3100));
+        assert_eq!(scan.obstacles().spread_mm(), Some(40));
+        assert_eq!(scan.openings(&scan.obstacles()).count(), 3);
+        assert_eq!(
+            scan.openings(&scan.obstacles()).nearest(3100, 10).map(|(_, bearing_mrad)| bearing_mrad),
+            Some(3100)
+        );
+    }
+
+    #[test]
+    fn an_edge_that_bends_beside_the_way_by_which_the_robot_came_is_no_meet_point() {
+        // In a room, between the wall with the door and the wall on the right.
+        let ring = RingGeometry::even();
+        let walls = [(8, 1340), (7, 1345), (9, 1350), (12, 1330), (11, 1340), (13, 1345)];
+        let room = [(10, 1890), (0, 2900), (1, 3000), (15, 2900), (2, 3300), (3, 2800), (4, 2700), (5, 2800)];
+        let ranges_mm = ranges(&[walls.as_slice(), &room].concat());
+        let scan = scan_of_16(&ranges_mm, &ring, Some(3142));
+        assert!(scan.obstacles().spread_mm().is_none_or(|spread_mm| spread_mm > 1000), "{:?}", scan.obstacles());
+    }
+
+    #[test]
+    fn a_closed_room_has_the_way_by_which_the_robot_came() {
+        let ring = RingGeometry::even();
+        let ranges_mm = core::array::from_fn(|sensor| [2000, 2050, 2800, 2050][sensor % 4]);
+        let scan = scan_of_16(&ranges_mm, &ring, None);
+        assert_eq!(scan.openings(&scan.obstacles()).count(), 0);
+        let scan = scan_of_16(&ranges_mm, &ring, Some(-3000));
+        assert_eq!(scan.openings(&scan.obstacles()).bearings_mrad(), [-3000]);
+        assert_eq!(scan.obstacles().spread_mm(), Some(0));
+    }
+
+    #[test]
+    fn a_wall_between_two_corners_is_no_opening() {
+        // A room of 2.9 m by 3.5 m; the wall on the left is the far one.
+        let ring = RingGeometry::even();
+        let near =
+            [(0, 1450), (1, 1500), (15, 1500), (8, 1450), (7, 1500), (9, 1500), (12, 1450), (11, 1500), (13, 1500)];
+        let far = [(2, 2480), (3, 2080), (4, 2030), (5, 2080), (6, 2480), (10, 2050), (14, 2050)];
+        let mut ranges_mm = ranges(&[near.as_slice(), &far].concat());
+        let scan = scan_of_16(&ranges_mm, &ring, None);
+        assert_eq!(scan.openings(&scan.obstacles()).count(), 0, "{:?}", scan.openings(&scan.obstacles()));
+        ranges_mm[2] = 3300;
+        let scan = scan_of_16(&ranges_mm, &ring, None);
+        assert_eq!(scan.openings(&scan.obstacles()).count(), 1);
     }
 }
