@@ -129,7 +129,7 @@ pub(super) struct LocalPlanner {
     search_frames: u16,
     /// Where the narrowest point of the edge is, in thousandths of the way of a ring frame at full speed,
     gap: Vector,
-    /// and the range of the obstacles beside it.
+    /// and the range of the obstacles beside it; 0 when the point is unknown.
     gap_mm: u16,
     /// The radius of the place that the robot left last.
     radius_mm: u16,
@@ -415,7 +415,7 @@ impl LocalPlanner {
         // The edge by which the robot came may end at a door that no sonar looks through from here.
         let is_back = turn_mrad(self.entry_mrad, self.target_mrad).abs() < BACK_MRAD;
         self.radius_mm = obstacles.radius_mm();
-        let is_door = u32::from(self.gap_mm) * 3 < u32::from(self.radius_mm) * 2;
+        let is_door = self.gap_mm > 0 && u32::from(self.gap_mm) * 3 < u32::from(self.radius_mm) * 2;
         let gap_mrad = self.gap.bearing_mrad();
         let wall = scan.nearest(|bearing_mrad| turn_mrad(gap_mrad, bearing_mrad).abs() < HIDDEN_MRAD);
         let is_hidden = wall.is_some_and(|wall| u32::from(wall.range_mm) * 5 < u32::from(self.radius_mm) * 8);
