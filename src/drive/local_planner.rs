@@ -47,6 +47,8 @@ const HIDDEN_MRAD: i32 = 200;
 const BACK_MRAD: i32 = 400;
 /// The position of a gap is known to about this distance, in thousandths of the way of a frame at full speed.
 const HOME_PERMILLE: i32 = 10_000;
+/// Obstacles at a larger angle from straight ahead have been passed, in milliradians: 100°.
+const AHEAD_MRAD: i32 = 1745;
 /// With a command beyond this bearing the robot turns in place, in milliradians.
 const IN_PLACE_MRAD: u16 = 600;
 /// After this many frames it drives out where the exit must be.
@@ -309,6 +311,9 @@ impl LocalPlanner {
         if self.state != DriveState::FollowEdge {
             return;
         }
+        // Nearer than the gap's own sides there is another wall: the robot is not where it is estimated to be.
+        let nearest = scan.nearest(|bearing_mrad| i32::from(bearing_mrad).abs() <= AHEAD_MRAD);
+        self.is_homing &= nearest.is_none_or(|nearest| u32::from(nearest.range_mm) * 3 >= u32::from(self.gap_mm) * 2);
         let Some(beside_mm) = beside_mm(scan, Sector::BESIDE) else { return };
         let is_open = nearest_ahead(scan).is_none_or(|ahead| ahead.range_mm > beside_mm.saturating_add(beside_mm / 2));
         if beside_mm <= self.gap_mm && is_open && !self.is_returning {
@@ -589,7 +594,7 @@ impl LocalPlanner {
     /// The speed that the room on both sides allows: it falls as a wall comes nearer than twice the body.
     fn speed_beside_permille<const SONARS: usize>(&self, scan: &RingScan<'_, SONARS>) -> u16 {
         let body_mm = self.config.body_radius_mm;
-        let within = |bearing_mrad: i16| i32::from(bearing_mrad).abs() <= 1745;
+        let within = |bearing_mrad: i16| i32::from(bearing_mrad).abs() <= AHEAD_MRAD;
         let nearest_mm = scan.nearest(within).map_or(u16::MAX, |nearest| nearest.range_mm);
         let room_mm = nearest_mm.saturating_sub(body_mm).min(body_mm);
         let share = u32::from(self.config.speed_permille) * u32::from(room_mm);
