@@ -57,7 +57,9 @@ impl Hall {
         };
         let ahead = within(-700, 700);
         if self.frames == 0 {
-            return self.enter(within(-200, 200), within(-1745, 1745), within(350, 2790), within(-2790, -350));
+            let is_between_walls = within(350, 1745).is_some() && within(-1745, -350).is_some();
+            let is_outside = !is_between_walls && !is_beside(within(-1745, 1745));
+            return self.enter(within(-200, 200), is_outside, within(350, 2790), within(-2790, -350));
         }
         self.frames = self.frames.saturating_add(1);
         let has_started = self.frames > START_FRAMES;
@@ -103,11 +105,10 @@ impl Hall {
     fn enter(
         &mut self,
         ahead: Option<Obstacle>,
-        around: Option<Obstacle>,
+        is_outside: bool,
         left: Option<Obstacle>,
         right: Option<Obstacle>,
     ) -> Option<i16> {
-        let is_beside = |obstacle: Option<Obstacle>| obstacle.is_some_and(|obstacle| obstacle.range_mm < BESIDE_MM);
         let is_near = ahead.is_some_and(|ahead| i32::from(ahead.range_mm) < DISTANCE_MM);
         let is_ahead = |obstacle: Option<Obstacle>| {
             obstacle.is_some_and(|obstacle| {
@@ -118,7 +119,7 @@ impl Hall {
             && is_ahead(right)
             && ahead.is_some_and(|ahead| i32::from(ahead.range_mm) * 2 < DISTANCE_MM * 3);
         let is_at_wall = is_in_corner || is_near && !is_beside(left) && !is_beside(right);
-        self.empty_frames = if around.is_none() { self.empty_frames.saturating_add(1) } else { 0 };
+        self.empty_frames = if is_outside { self.empty_frames.saturating_add(1) } else { 0 };
         let has_left_corridor = self.empty_frames >= EMPTY_FRAMES && (is_beside(left) || is_beside(right));
         if has_left_corridor || is_at_wall {
             *self = Self { frames: if is_at_wall { START_FRAMES } else { 1 }, empty_frames: 0 };
@@ -131,6 +132,11 @@ impl Hall {
     pub(super) fn leave(&mut self) {
         *self = Self::new();
     }
+}
+
+/// Whether an obstacle is near enough for a wall beside the robot.
+fn is_beside(obstacle: Option<Obstacle>) -> bool {
+    obstacle.is_some_and(|obstacle| obstacle.range_mm < BESIDE_MM)
 }
 
 #[cfg(test)]
