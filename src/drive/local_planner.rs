@@ -51,7 +51,8 @@ const HOME_PERMILLE: i32 = 10_000;
 const AHEAD_MRAD: i32 = 1745;
 /// With a command beyond this bearing the robot turns in place, in milliradians.
 const IN_PLACE_MRAD: u16 = 600;
-/// After this many frames it drives out where the exit must be.
+/// After this many frames it drives out where the exit must be. A robot that follows the wall of a hall leaves a meet point that the detector
+/// has not confirmed in this time, and approaches none for the same time.
 const SEARCH_FRAMES: u16 = 24;
 /// For this many frames after departing the robot still counts as at the place: an obstacle that is hidden for a moment
 /// must not make another place.
@@ -342,7 +343,11 @@ impl LocalPlanner {
         obstacles: &Obstacles,
         is_at_place: bool,
     ) -> VelocityCommand {
-        if !is_at_place && obstacles.spread_mm().is_some_and(|spread_mm| spread_mm <= scan.equidistance_mm()) {
+        let is_refused = self.hall.is_followed() && self.frames < SEARCH_FRAMES;
+        if !is_refused
+            && !is_at_place
+            && obstacles.spread_mm().is_some_and(|spread_mm| spread_mm <= scan.equidistance_mm())
+        {
             // The rotation of this frame is applied to it as to that of any other.
             self.entry_mrad = rotated(HALF_TURN_MRAD, -self.rotation_mrad);
             self.enter(DriveState::Approach);
@@ -366,7 +371,9 @@ impl LocalPlanner {
             return self.give_up(scan);
         }
         let limit_mm = scan.equidistance_mm().saturating_mul(2);
-        if obstacles.spread_mm().is_some_and(|spread_mm| spread_mm > limit_mm) {
+        // In the corner of a hall an echo at a flat angle may look like a third wall. The detector does not confirm it.
+        let is_refused = self.hall.is_followed() && self.frames > SEARCH_FRAMES;
+        if is_refused || obstacles.spread_mm().is_some_and(|spread_mm| spread_mm > limit_mm) {
             self.enter(DriveState::FollowEdge);
             return self.follow_edge(scan, obstacles, false);
         }
