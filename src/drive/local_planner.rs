@@ -8,7 +8,7 @@ use crate::bearing::{HALF_TURN_MRAD, Vector, counter_clockwise_mrad, rotated, tu
 use crate::config_error::ConfigError;
 use crate::fault::{FaultCounters, FaultKind};
 use crate::filter::{Exit, Passage};
-use crate::place::{Obstacle, Obstacles, Openings, RingScan};
+use crate::place::{Obstacle, Obstacles, Openings, PlaceDetector, RingScan};
 use crate::ring::Echo;
 use crate::top_k::TopK;
 
@@ -48,7 +48,7 @@ const BACK_MRAD: i32 = 400;
 /// The position of a gap is known to about this distance, in thousandths of the way of a frame at full speed.
 const HOME_PERMILLE: i32 = 10_000;
 /// Obstacles at a larger angle from straight ahead have been passed, in milliradians: 100°.
-const AHEAD_MRAD: i32 = 1745;
+const AHEAD_MRAD: i16 = 1745;
 /// With a command beyond this bearing the robot turns in place, in milliradians.
 const IN_PLACE_MRAD: u16 = 600;
 /// After this many frames it drives out where the exit must be. A robot that follows the wall of a hall leaves a meet point that the detector
@@ -267,18 +267,15 @@ impl LocalPlanner {
         self.enter(DriveState::FollowEdge);
     }
 
-    /// Processes the next frame. `rotation_mrad` and `is_at_place` are those of the
-    /// [`PlaceDetector`](crate::place::PlaceDetector); `choose` returns the bearing of the exit to take, `None` to stop.
+    /// Processes the newest frame of the detector; `choose` returns the bearing of the exit to take, `None` to stop.
     pub(super) fn advance<const SONARS: usize>(
         &mut self,
-        scan: &RingScan<'_, SONARS>,
-        rotation_mrad: i32,
-        is_at_place: bool,
+        detector: &PlaceDetector<SONARS>,
         choose: impl FnOnce(&Exits) -> Option<u16>,
     ) -> VelocityCommand {
         self.frames = self.frames.saturating_add(1);
-        self.rotation_mrad = rotation_mrad;
-        let obstacles = scan.obstacles();
+        self.rotation_mrad = detector.rotation_mrad();
+        let (scan, obstacles, is_at_place) = (&detector.scan(), detector.obstacles(), detector.is_at_place());
         self.track_gap(scan);
         self.body.look(scan, nearest_ahead(scan), self.config.body_radius_mm);
         let is_held = self.body.is_held(scan, self.speed_permille, self.config.body_radius_mm);
@@ -313,8 +310,10 @@ impl LocalPlanner {
             return;
         }
         // Nearer than the gap's own sides there is another wall: the robot is not where it is estimated to be.
-        let nearest = scan.nearest(|bearing_mrad| i32::from(bearing_mrad).abs() <= AHEAD_MRAD);
-        self.is_homing &= nearest.is_none_or(|nearest| u32::from(nearest.range_mm) * 3 >= u32::from(self.gap_mm) * 2);
+        self.is_homing = self.is_homing
+            && scan
+                .nearest_between(-AHEAD_MRAD, AHEAD_MRAD)
+                .is_none_or(|nearest| u32::from(nearest.range_mm) * 3 >= u32::from(self.gap_mm) * 2);
         let Some(beside_mm) = beside_mm(scan, Sector::BESIDE) else { return };
         let is_open = nearest_ahead(scan).is_none_or(|ahead| ahead.range_mm > beside_mm.saturating_add(beside_mm / 2));
         if beside_mm <= self.gap_mm && is_open && !self.is_returning {
@@ -601,8 +600,7 @@ impl LocalPlanner {
     /// The speed that the room on both sides allows: it falls as a wall comes nearer than twice the body.
     fn speed_beside_permille<const SONARS: usize>(&self, scan: &RingScan<'_, SONARS>) -> u16 {
         let body_mm = self.config.body_radius_mm;
-        let within = |bearing_mrad: i16| i32::from(bearing_mrad).abs() <= AHEAD_MRAD;
-        let nearest_mm = scan.nearest(within).map_or(u16::MAX, |nearest| nearest.range_mm);
+        let nearest_mm = scan.nearest_between(-AHEAD_MRAD, AHEAD_MRAD).map_or(u16::MAX, |nearest| nearest.range_mm);
         let room_mm = nearest_mm.saturating_sub(body_mm).min(body_mm);
         let share = u32::from(self.config.speed_permille) * u32::from(room_mm);
         let share = share.checked_div(body_mm.into()).map_or(u16::MAX, |share| share as u16);
@@ -639,6 +637,7 @@ impl LocalPlanner {
 }
 
 /// Half-width of the sector whose sensors measure the range ahead: wider where all of those straight ahead are dead.
+#[inline(never)]
 fn facing_mrad<const SONARS: usize>(scan: &RingScan<'_, SONARS>) -> i32 {
     let faces = |bearing_mrad: i16| i32::from(bearing_mrad).abs() < FACING_MRAD;
     let is_live = scan.echoes().any(|(echo, bearing_mrad)| echo != Echo::Dead && faces(bearing_mrad));
@@ -646,7 +645,8 @@ fn facing_mrad<const SONARS: usize>(scan: &RingScan<'_, SONARS>) -> i32 {
 }
 
 /// The nearest obstacle ahead.
+#[inline(never)]
 fn nearest_ahead<const SONARS: usize>(scan: &RingScan<'_, SONARS>) -> Option<Obstacle> {
-    let within_mrad = facing_mrad(scan);
-    scan.nearest(|bearing_mrad| i32::from(bearing_mrad).abs() < within_mrad)
+    let within_mrad = facing_mrad(scan) as i16;
+    scan.nearest_between(1 - within_mrad, within_mrad - 1)
 }
