@@ -1,6 +1,6 @@
 //! One smoothed reading of the ring, and the closest obstacles in it, in separate bearings.
 
-use super::openings::is_open;
+use super::openings::{SAME_OPENING_MRAD, is_open};
 use super::smoothing::{DEAD_MM, SILENT_MM, is_echo};
 use crate::bearing::{rotated, turn_mrad};
 use crate::ring::{Echo, RingGeometry};
@@ -177,10 +177,19 @@ impl<const SONARS: usize> RingScan<'_, SONARS> {
         let Some(came_by_mrad) = self.came_by_mrad else { return heard };
         let mut obstacles = heard;
         obstacles.split(came_by_mrad);
-        if obstacles.equidistant > heard.equidistant && self.is_joined(came_by_mrad, &obstacles) {
+        if obstacles.equidistant == heard.equidistant || self.heard_way(came_by_mrad, &heard).is_some() {
+            return heard;
+        }
+        if self.is_joined(came_by_mrad, &obstacles) {
             obstacles.spread_mm = obstacles.third_spread_mm();
         }
         obstacles
+    }
+
+    /// The opening that the sonars show where a way must be. The obstacle beside it is then none that hides the way.
+    pub(super) fn heard_way(&self, way_mrad: i16, heard: &Obstacles) -> Option<i16> {
+        let openings = Self { came_by_mrad: None, ..*self }.openings(heard);
+        openings.nearest(way_mrad, SAME_OPENING_MRAD).map(|(_, opening_mrad)| opening_mrad)
     }
 
     /// Whether a narrow way is at a meet point: it joins others, or an obstacle is opposite to it. Otherwise the robot passes it.
