@@ -13,7 +13,7 @@ const OPEN_PERCENT: u32 = 160;
 const FAR_PERCENT: u32 = 220;
 
 /// Openings of two scans within this angle are the same, in milliradians.
-pub(super) const SAME_OPENING_MRAD: u16 = 500;
+const SAME_OPENING_MRAD: i32 = 500;
 /// The most different openings of the merged scans.
 const MERGED_MAX: usize = 8;
 
@@ -39,7 +39,7 @@ impl Openings {
 
     /// Inserts an opening that is none of those present.
     pub(super) fn insert(&mut self, bearing_mrad: i16) {
-        if self.nearest(bearing_mrad, SAME_OPENING_MRAD).is_none() {
+        if self.nearest(bearing_mrad, SAME_OPENING_MRAD as u16).is_none() {
             self.bearings_mrad.insert(bearing_mrad, |one, other| one <= other);
         }
     }
@@ -72,7 +72,7 @@ impl MergedOpenings {
         for &bearing_mrad in openings.bearings_mrad() {
             let bearing_mrad = rotated(bearing_mrad, by_mrad);
             let is_same = |&&mut (mean_mrad, scans): &&mut (i16, u8)| {
-                scans == 0 || turn_mrad(mean_mrad, bearing_mrad).abs() <= i32::from(SAME_OPENING_MRAD)
+                scans == 0 || turn_mrad(mean_mrad, bearing_mrad).abs() <= SAME_OPENING_MRAD
             };
             if let Some((mean_mrad, scans)) = self.openings.iter_mut().find(is_same) {
                 let weight = i32::from(*scans) + 1;
