@@ -78,6 +78,12 @@ impl Body {
         speed_permille: u16,
         body_radius_mm: u16,
     ) -> bool {
+        let nearest = scan.nearest_between(i16::MIN, i16::MAX);
+        if nearest.is_none_or(|nearest| nearest.range_mm > body_radius_mm.saturating_add(HELD_MM)) {
+            // The next frame at a wall is the first one.
+            (self.ahead_mm, self.behind_mm, self.driven_permille) = (0, 0, speed_permille.into());
+            return false;
+        }
         let range_mm = |towards_mrad: i16| {
             let obstacle = scan.nearest(|bearing_mrad| turn_mrad(towards_mrad, bearing_mrad).abs() < 300);
             obstacle.map_or(u16::MAX, |obstacle| obstacle.range_mm)
@@ -86,12 +92,10 @@ impl Body {
         let changes_mm = [ahead_mm.abs_diff(self.ahead_mm), behind_mm.abs_diff(self.behind_mm)];
         let has_moved = changes_mm.iter().any(|change_mm| (UNCHANGED_MM..OTHER_MM).contains(change_mm));
         let is_other = changes_mm.iter().any(|change_mm| *change_mm >= OTHER_MM);
-        let nearest = scan.nearest(|_| true);
-        let is_free = nearest.is_none_or(|nearest| nearest.range_mm > body_radius_mm.saturating_add(HELD_MM));
-        if has_moved || is_other || is_free {
+        if has_moved || is_other {
             (self.ahead_mm, self.behind_mm) = (ahead_mm, behind_mm);
         }
-        if has_moved || is_free {
+        if has_moved {
             self.driven_permille = 0;
         }
         self.driven_permille = self.driven_permille.saturating_add(speed_permille.into());
@@ -101,9 +105,8 @@ impl Body {
 
 /// Whether the gap between the obstacles on both sides is narrower than the body, or these are the walls of a corner.
 fn is_narrow<const SONARS: usize>(scan: &RingScan<'_, SONARS>, ahead: Option<Obstacle>, body_radius_mm: u16) -> bool {
-    let within = |bearing_mrad: i16| (350..=AHEAD_MRAD).contains(&bearing_mrad);
-    let left = scan.nearest(within);
-    let right = scan.nearest(|bearing_mrad| within(bearing_mrad.saturating_neg()));
+    let left = scan.nearest_between(350, AHEAD_MRAD);
+    let right = scan.nearest_between(-AHEAD_MRAD, -350);
     let (Some(left), Some(right)) = (left, right) else { return false };
     let mean_mm = left.range_mm / 2 + right.range_mm / 2;
     if mean_mm < body_radius_mm.saturating_add(PLAY_MM) {

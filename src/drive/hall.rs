@@ -52,12 +52,10 @@ impl Hall {
     /// The heading along the wall of a hall, in milliradians; `None` if the robot is not in a hall. Above the limit of the wheels it turns
     /// in place.
     pub(super) fn heading_mrad<const SONARS: usize>(&mut self, scan: &RingScan<'_, SONARS>) -> Option<i16> {
-        let within = |from_mrad: i16, to_mrad: i16| {
-            scan.nearest(|bearing_mrad: i16| (from_mrad..=to_mrad).contains(&bearing_mrad))
-        };
+        let within = |from_mrad, to_mrad| scan.nearest_between(from_mrad, to_mrad);
         let ahead = within(-700, 700);
         if self.frames == 0 {
-            return self.enter(within(-200, 200), within(-1745, 1745), within(350, 2790), within(-2790, -350));
+            return self.enter(within);
         }
         self.frames = self.frames.saturating_add(1);
         let has_started = self.frames > START_FRAMES;
@@ -100,13 +98,15 @@ impl Hall {
 
     /// Decides whether the robot is in a hall: nothing is in range ahead or beside it after a corridor has ended, or it comes to a wall
     /// without others beside it.
-    fn enter(
-        &mut self,
-        ahead: Option<Obstacle>,
-        around: Option<Obstacle>,
-        left: Option<Obstacle>,
-        right: Option<Obstacle>,
-    ) -> Option<i16> {
+    fn enter(&mut self, within: impl Fn(i16, i16) -> Option<Obstacle>) -> Option<i16> {
+        self.empty_frames = if within(-1745, 1745).is_none() { self.empty_frames.saturating_add(1) } else { 0 };
+        let is_empty = self.empty_frames >= EMPTY_FRAMES;
+        let ahead = within(-200, 200);
+        // In most frames of a corridor the walls beside the robot need not be searched.
+        if !is_empty && ahead.is_none_or(|ahead| i32::from(ahead.range_mm) * 2 >= DISTANCE_MM * 3) {
+            return None;
+        }
+        let (left, right) = (within(350, 2790), within(-2790, -350));
         let is_beside = |obstacle: Option<Obstacle>| obstacle.is_some_and(|obstacle| obstacle.range_mm < BESIDE_MM);
         let is_near = ahead.is_some_and(|ahead| i32::from(ahead.range_mm) < DISTANCE_MM);
         let is_ahead = |obstacle: Option<Obstacle>| {
@@ -118,8 +118,7 @@ impl Hall {
             && is_ahead(right)
             && ahead.is_some_and(|ahead| i32::from(ahead.range_mm) * 2 < DISTANCE_MM * 3);
         let is_at_wall = is_in_corner || is_near && !is_beside(left) && !is_beside(right);
-        self.empty_frames = if around.is_none() { self.empty_frames.saturating_add(1) } else { 0 };
-        let has_left_corridor = self.empty_frames >= EMPTY_FRAMES && (is_beside(left) || is_beside(right));
+        let has_left_corridor = is_empty && (is_beside(left) || is_beside(right));
         if has_left_corridor || is_at_wall {
             *self = Self { frames: if is_at_wall { START_FRAMES } else { 1 }, empty_frames: 0 };
             return Some(if is_at_wall { 1571 } else { ROUND_MRAD });

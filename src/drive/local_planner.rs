@@ -8,7 +8,7 @@ use crate::bearing::{HALF_TURN_MRAD, Vector, counter_clockwise_mrad, rotated, tu
 use crate::config_error::ConfigError;
 use crate::fault::{FaultCounters, FaultKind};
 use crate::filter::{Exit, Passage};
-use crate::place::{Obstacle, Obstacles, Openings, RingScan};
+use crate::place::{Obstacle, Obstacles, Openings, PlaceDetector, RingScan};
 use crate::ring::Echo;
 use crate::top_k::TopK;
 
@@ -264,18 +264,15 @@ impl LocalPlanner {
         self.enter(DriveState::FollowEdge);
     }
 
-    /// Processes the next frame. `rotation_mrad` and `is_at_place` are those of the
-    /// [`PlaceDetector`](crate::place::PlaceDetector); `choose` returns the bearing of the exit to take, `None` to stop.
+    /// Processes the newest frame of the detector; `choose` returns the bearing of the exit to take, `None` to stop.
     pub(super) fn advance<const SONARS: usize>(
         &mut self,
-        scan: &RingScan<'_, SONARS>,
-        rotation_mrad: i32,
-        is_at_place: bool,
+        detector: &PlaceDetector<SONARS>,
         choose: impl FnOnce(&Exits) -> Option<u16>,
     ) -> VelocityCommand {
         self.frames = self.frames.saturating_add(1);
-        self.rotation_mrad = rotation_mrad;
-        let obstacles = scan.obstacles();
+        self.rotation_mrad = detector.rotation_mrad();
+        let (scan, obstacles, is_at_place) = (&detector.scan(), detector.obstacles(), detector.is_at_place());
         self.track_gap(scan);
         self.body.look(scan, nearest_ahead(scan), self.config.body_radius_mm);
         let is_held = self.body.is_held(scan, self.speed_permille, self.config.body_radius_mm);
@@ -589,8 +586,7 @@ impl LocalPlanner {
     /// The speed that the room on both sides allows: it falls as a wall comes nearer than twice the body.
     fn speed_beside_permille<const SONARS: usize>(&self, scan: &RingScan<'_, SONARS>) -> u16 {
         let body_mm = self.config.body_radius_mm;
-        let within = |bearing_mrad: i16| i32::from(bearing_mrad).abs() <= 1745;
-        let nearest_mm = scan.nearest(within).map_or(u16::MAX, |nearest| nearest.range_mm);
+        let nearest_mm = scan.nearest_between(-1745, 1745).map_or(u16::MAX, |nearest| nearest.range_mm);
         let room_mm = nearest_mm.saturating_sub(body_mm).min(body_mm);
         let share = u32::from(self.config.speed_permille) * u32::from(room_mm);
         let share = share.checked_div(body_mm.into()).map_or(u16::MAX, |share| share as u16);
@@ -627,6 +623,7 @@ impl LocalPlanner {
 }
 
 /// Half-width of the sector whose sensors measure the range ahead: wider where all of those straight ahead are dead.
+#[inline(never)]
 fn facing_mrad<const SONARS: usize>(scan: &RingScan<'_, SONARS>) -> i32 {
     let faces = |bearing_mrad: i16| i32::from(bearing_mrad).abs() < FACING_MRAD;
     let is_live = scan.echoes().any(|(echo, bearing_mrad)| echo != Echo::Dead && faces(bearing_mrad));
@@ -634,7 +631,8 @@ fn facing_mrad<const SONARS: usize>(scan: &RingScan<'_, SONARS>) -> i32 {
 }
 
 /// The nearest obstacle ahead.
+#[inline(never)]
 fn nearest_ahead<const SONARS: usize>(scan: &RingScan<'_, SONARS>) -> Option<Obstacle> {
-    let within_mrad = facing_mrad(scan);
-    scan.nearest(|bearing_mrad| i32::from(bearing_mrad).abs() < within_mrad)
+    let within_mrad = facing_mrad(scan) as i16;
+    scan.nearest_between(1 - within_mrad, within_mrad - 1)
 }

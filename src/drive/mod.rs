@@ -111,9 +111,7 @@ impl<const V: usize> Drive<V> {
             return VelocityCommand::STOP;
         }
         let route_planner = &mut self.route_planner;
-        self.local_planner.advance(&detector.scan(), detector.rotation_mrad(), detector.is_at_place(), |exits| {
-            route_planner.choose(filter, exits)
-        })
+        self.local_planner.advance(detector, |exits| route_planner.choose(filter, exits))
     }
 
     /// How the robot drives from the place that was reported last: the hints of the next observation.

@@ -15,6 +15,7 @@ pub(super) fn edge_frames(darts: Darts<'_>, dart: DartId) -> u32 {
 /// The shortest travel time from each vertex to one that `is_target` accepts, in ring frames; `None` where no path leads to one.
 ///
 /// Dijkstra's algorithm. Time O(V² + D).
+#[inline(never)]
 pub(super) fn frames_to<const V: usize>(
     darts: Darts<'_>,
     is_target: impl Fn(VertexId) -> bool,

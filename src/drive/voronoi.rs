@@ -9,7 +9,7 @@ use crate::place::{Obstacle, Obstacles, RingScan};
 use crate::ring::Echo;
 
 /// Ahead is within this angle of straight ahead, in milliradians.
-const AHEAD_MRAD: i32 = 1047;
+const AHEAD_MRAD: i16 = 1047;
 /// A wall is heard this far off its normal, in milliradians: silence nearer to the normal is a gap.
 const GAP_MRAD: i32 = 720;
 
@@ -40,9 +40,8 @@ pub(super) fn edge_heading_mrad<const SONARS: usize>(
     sector: Sector,
     look_ahead_mm: u16,
 ) -> Option<i16> {
-    let within = |bearing_mrad: i16| (sector.from_mrad..=sector.to_mrad).contains(&bearing_mrad);
-    let left = scan.nearest(within);
-    let right = scan.nearest(|bearing_mrad| within(bearing_mrad.saturating_neg()));
+    let left = scan.nearest_between(sector.from_mrad, sector.to_mrad);
+    let right = scan.nearest_between(-sector.to_mrad, -sector.from_mrad);
     match (left, right) {
         (None, _) | (_, None) if sector == Sector::DOOR => None,
         (Some(left), Some(right)) => Some(heading_between_mrad(left, right, look_ahead_mm)),
@@ -54,9 +53,8 @@ pub(super) fn edge_heading_mrad<const SONARS: usize>(
 
 /// Mean range of the nearest obstacles on the left and on the right; `None` without an obstacle on one side.
 pub(super) fn beside_mm<const SONARS: usize>(scan: &RingScan<'_, SONARS>, sector: Sector) -> Option<u16> {
-    let within = |bearing_mrad: i16| (sector.from_mrad..=sector.to_mrad).contains(&bearing_mrad);
-    let left = scan.nearest(within)?;
-    let right = scan.nearest(|bearing_mrad| within(bearing_mrad.saturating_neg()))?;
+    let left = scan.nearest_between(sector.from_mrad, sector.to_mrad)?;
+    let right = scan.nearest_between(-sector.to_mrad, -sector.from_mrad)?;
     Some(left.range_mm / 2 + right.range_mm / 2)
 }
 
@@ -66,7 +64,7 @@ pub(super) fn gap_ahead_mrad<const SONARS: usize>(
     scan: &RingScan<'_, SONARS>,
     towards_mrad: i16,
 ) -> Option<(i16, u16)> {
-    let wall = scan.nearest(|bearing_mrad| i32::from(bearing_mrad).abs() < AHEAD_MRAD)?;
+    let wall = scan.nearest_between(1 - AHEAD_MRAD, AHEAD_MRAD - 1)?;
     let is_left = turn_mrad(wall.bearing_mrad, towards_mrad) > 0;
     let (mut count, mut sum_mrad) = (0i32, 0i32);
     for (echo, bearing_mrad) in scan.echoes() {

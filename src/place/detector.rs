@@ -90,6 +90,8 @@ pub struct PlaceDetector<const SONARS: usize> {
     smoother: RangeSmoother<SONARS>,
     /// The newest frame, smoothed.
     smooth_mm: [u16; SONARS],
+    /// Its obstacles, as the sonars hear them.
+    heard: Obstacles,
     frame_index: u32,
     rotation: RotationEstimate,
     /// The rotation of all bearings since the start, −3142 to 3142.
@@ -127,6 +129,7 @@ impl<const SONARS: usize> PlaceDetector<SONARS> {
             plausibility: Plausibility::new(),
             smoother: RangeSmoother::new(),
             smooth_mm: [DEAD_MM; SONARS],
+            heard: Obstacles::NONE,
             frame_index: 0,
             rotation: RotationEstimate::new(),
             turned_mrad: 0,
@@ -168,6 +171,7 @@ impl<const SONARS: usize> PlaceDetector<SONARS> {
         }
         self.is_started = true;
         self.smooth_mm = [DEAD_MM; SONARS];
+        self.heard = Obstacles::NONE;
         self.plausibility.clear();
         self.smoother.clear();
         self.frame_index = 0;
@@ -213,6 +217,7 @@ impl<const SONARS: usize> PlaceDetector<SONARS> {
             return None;
         }
         let heard = self.scan().heard_obstacles();
+        self.heard = heard;
         self.rotation.update(&self.smooth_mm, &self.geometry);
         self.turned_mrad = rotated(self.turned_mrad, self.rotation.rotation_mrad());
         self.track_way(&heard);
@@ -234,6 +239,11 @@ impl<const SONARS: usize> PlaceDetector<SONARS> {
             equidistance_mm: self.config.equidistance_mm,
             came_by_mrad: if self.came_by_frames >= CAME_BY_FRAMES { Some(self.came_by_mrad) } else { None },
         }
+    }
+
+    /// The obstacles of the newest frame, as those of its [`scan`](Self::scan), without a search.
+    pub(crate) fn obstacles(&self) -> Obstacles {
+        self.scan().beside_way(self.heard)
     }
 
     /// Change of all bearings between the two newest frames in milliradians, counter-clockwise positive: the negative of the
@@ -303,11 +313,11 @@ impl<const SONARS: usize> PlaceDetector<SONARS> {
         let is_beside = |obstacle: &Obstacle| BESIDE_MRAD.contains(&i32::from(obstacle.bearing_mrad).abs());
         let is_between = is_beside(one) && is_beside(other) && (one.bearing_mrad < 0) != (other.bearing_mrad < 0);
         let is_behind = |bearing_mrad: i16| turn_mrad(HALF_TURN_MRAD, bearing_mrad).abs() <= BEHIND_MRAD;
-        let is_open = self.scan().nearest(is_behind).is_none_or(|behind| is_open(behind.range_mm, other.range_mm));
+        let is_open = || self.scan().nearest(is_behind).is_none_or(|behind| is_open(behind.range_mm, other.range_mm));
         let is_edge = other.range_mm.saturating_sub(one.range_mm) <= self.config.equidistance_mm;
         let is_straight = self.rotation.rotation_mrad().abs() <= STRAIGHT_MRAD;
         let is_known = self.came_by_frames >= CAME_BY_FRAMES;
-        if is_between && is_edge && is_straight && (is_open || is_known) {
+        if is_between && is_edge && is_straight && (is_known || is_open()) {
             if !is_known {
                 self.came_by_frames += 1;
             }

@@ -45,6 +45,7 @@ impl<const SONARS: usize> Plausibility<SONARS> {
 
     /// Takes the ranges of a frame, in ascending order of bearing, and the rotation of the ring, and marks the sonars that are left out as
     /// dead. Returns how many more are left out than before. Time `O(SONARS)`, at the end of a test `O(SONARS²)`.
+    #[inline(never)]
     pub(super) fn check(&mut self, ranges_mm: &mut [u16; SONARS], rotation_mrad: i32) -> u8 {
         let measured_mm = *ranges_mm;
         // Beside a dead sonar, or one that is left out, a range cannot be compared.

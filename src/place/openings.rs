@@ -118,6 +118,7 @@ impl<const SONARS: usize> RingScan<'_, SONARS> {
     }
 
     /// The openings of the gaps that are narrower than `narrow_mrad`, or of all gaps if it is 0.
+    #[inline(never)]
     fn gaps(&self, obstacles: &Obstacles, narrow_mrad: u16) -> Openings {
         let mut bearings_mrad = TopK::new(0);
         let radius_mm = obstacles.radius_mm();

@@ -50,6 +50,7 @@ impl RotationEstimate {
     /// Updates the estimate with the next frame. A frame without echoes continues the rotation.
     ///
     /// Time O(SONARS): nine comparisons of profiles of 32 bearings.
+    #[inline(never)]
     pub(super) fn update<const SONARS: usize>(&mut self, ranges_mm: &[u16; SONARS], geometry: &RingGeometry<SONARS>) {
         let now = proximity_profile(ranges_mm, geometry);
         if now.iter().all(|&proximity| proximity == 0) {
@@ -64,9 +65,15 @@ impl RotationEstimate {
         let expected = self.turned.wrapping_add(self.rate);
         let centre = (i32::from(expected) + BIN / 2).div_euclid(BIN);
         let sum: u32 = now.iter().chain(&self.reference).map(|&proximity| u32::from(proximity)).sum();
-        let price = |bins: i32| difference(&self.reference, &now, bins) + sum / UNEXPECTED * bins.abs_diff(centre);
         let here = (i32::from(self.turned) + BIN / 2).div_euclid(BIN);
-        let best = (here - SEARCHED..=here + SEARCHED).min_by_key(|&bins| price(bins)).unwrap_or(here);
+        let (mut best, mut least) = (here, u32::MAX);
+        for bins in here - SEARCHED..=here + SEARCHED {
+            let price = sum / UNEXPECTED * bins.abs_diff(centre);
+            let price = price + difference(&self.reference, &now, bins);
+            if price < least {
+                (best, least) = (bins, price);
+            }
+        }
         let [before, at, after] = [best - 1, best, best + 1].map(|bins| difference(&self.reference, &now, bins));
         // The difference grows linearly to both sides of its minimum.
         let part = BIN / 2 * (before as i32 - after as i32);
@@ -88,17 +95,20 @@ impl RotationEstimate {
 }
 
 /// By how much a profile differs from another one that is rotated by `bins`.
+#[inline(never)]
 fn difference(reference: &Profile, now: &Profile, bins: i32) -> u32 {
-    let mut sum = 0;
-    for (bearing, &proximity) in (0_i32..).zip(now) {
-        let before = bearing.wrapping_sub(bins) as usize % BINS;
-        sum += u32::from(reference.get(before).copied().unwrap_or(0).abs_diff(proximity));
-    }
-    sum
+    let (first, last) = now.split_at(bins as usize % BINS);
+    let (before_last, before_first) = reference.split_at(last.len());
+    difference_of_part(before_last, last) + difference_of_part(before_first, first)
+}
+
+fn difference_of_part(before: &[u16], now: &[u16]) -> u32 {
+    before.iter().zip(now).fold(0, |sum, (&before, &now)| sum + u32::from(before.abs_diff(now)))
 }
 
 /// The proximity at 32 bearings from straight behind, interpolated between the live sensors beside each. Ranges and bearings are in
 /// ascending order of bearing.
+#[inline(never)]
 fn proximity_profile<const SONARS: usize>(ranges_mm: &[u16; SONARS], geometry: &RingGeometry<SONARS>) -> Profile {
     let mut profile = [0; BINS];
     let live = ranges_mm.iter().zip(&geometry.bearings_mrad).filter(|&(&range_mm, _)| range_mm != DEAD_MM);

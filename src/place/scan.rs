@@ -79,6 +79,15 @@ impl Obstacles {
     /// Maximum number of obstacles in a scan: with 60° between them no more fit.
     pub const MAX: usize = 6;
 
+    /// No obstacle.
+    pub(super) const NONE: Self = Self {
+        obstacles: [Obstacle { range_mm: 0, bearing_mrad: 0 }; Self::MAX],
+        len: 0,
+        equidistant: 0,
+        spread_mm: None,
+        is_at_door: false,
+    };
+
     /// Iterates over the obstacles, nearest first.
     pub fn iter(&self) -> impl Iterator<Item = &Obstacle> + Clone {
         self.obstacles.iter().take(self.len)
@@ -164,6 +173,14 @@ impl<const SONARS: usize> RingScan<'_, SONARS> {
         echoes.min_by_key(|(range_mm, _)| *range_mm).map(|echo| self.obstacle(echo))
     }
 
+    /// Finds the nearest obstacle among the sensors with bearings from `from_mrad` to `to_mrad`.
+    ///
+    /// Time `O(SONARS)`.
+    #[inline(never)]
+    pub fn nearest_between(&self, from_mrad: i16, to_mrad: i16) -> Option<Obstacle> {
+        self.nearest(|bearing_mrad| (from_mrad..=to_mrad).contains(&bearing_mrad))
+    }
+
     /// Finds the closest obstacles: first the nearest echo, then repeatedly the nearest echo apart from all obstacles before: at
     /// least `separation_mrad` from them, or beyond a sensor that looks through between them, as through a door.
     ///
@@ -175,6 +192,7 @@ impl<const SONARS: usize> RingScan<'_, SONARS> {
     }
 
     /// Counts an obstacle in the way by which the robot came as the two obstacles beside it.
+    #[inline(never)]
     pub(super) fn beside_way(&self, heard: Obstacles) -> Obstacles {
         let Some(came_by_mrad) = self.came_by_mrad else { return heard };
         let mut obstacles = heard;
@@ -195,12 +213,14 @@ impl<const SONARS: usize> RingScan<'_, SONARS> {
     }
 
     /// Whether a narrow way is at a meet point: it joins others, or an obstacle is opposite to it. Otherwise the robot passes it.
+    #[inline(never)]
     fn is_joined(&self, way_mrad: i16, obstacles: &Obstacles) -> bool {
         let is_opposite = |obstacle: &Obstacle| turn_mrad(way_mrad, obstacle.bearing_mrad).abs() > OPPOSITE_MRAD;
         obstacles.equidistant().any(is_opposite) || self.openings(obstacles).count() > 2
     }
 
     /// The closest obstacles as the sonars hear them.
+    #[inline(never)]
     pub(super) fn heard_obstacles(&self) -> Obstacles {
         let mut obstacles = self.closest(|index, bearing_mrad, found| self.is_apart(index, bearing_mrad, found));
         let gap = |one: &Obstacle| {
@@ -220,13 +240,7 @@ impl<const SONARS: usize> RingScan<'_, SONARS> {
 
     /// The closest obstacles that are apart from each other, up to the first that is not equidistant.
     fn closest(&self, is_apart: impl Fn(usize, i16, &[Obstacle]) -> bool) -> Obstacles {
-        let mut closest = Obstacles {
-            obstacles: [Obstacle::default(); Obstacles::MAX],
-            len: 0,
-            equidistant: 0,
-            spread_mm: None,
-            is_at_door: false,
-        };
+        let mut closest = Obstacles::NONE;
         let mut nearest_mm = None;
         for number in 0..Obstacles::MAX {
             let found = closest.obstacles.get(..number).unwrap_or(&[]);
@@ -318,6 +332,7 @@ impl<const SONARS: usize> RingScan<'_, SONARS> {
 
     /// The obstacle that an echo comes from. Its bearing is the mean over the sensors within half the separation that
     /// measure about the same range, because noise decides which of them measures the shortest.
+    #[inline(never)]
     fn obstacle(&self, (range_mm, bearing_mrad): (u16, i16)) -> Obstacle {
         let limit_mm = range_mm.saturating_add(self.equidistance_mm);
         let mut count = 0i32;

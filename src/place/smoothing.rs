@@ -27,6 +27,7 @@ impl<const SONARS: usize> RangeSmoother<SONARS> {
     }
 
     /// Takes the ranges of the next frame and returns them smoothed. Time `O(SONARS)`.
+    #[inline(never)]
     pub(super) fn update(&mut self, now_mm: [u16; SONARS]) -> [u16; SONARS] {
         let [before_mm, long_before_mm, first_mm] = self.earlier_mm;
         self.earlier_mm = [now_mm, before_mm, long_before_mm];

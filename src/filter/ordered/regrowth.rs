@@ -16,7 +16,7 @@ use rand_core::Rng;
 use rand_xoshiro::Xoshiro128PlusPlus;
 
 /// A step stops after the place at which it has computed this many explanations.
-const EXPLANATIONS: usize = 350;
+const EXPLANATIONS: usize = 240;
 
 /// Of 16 regrowths, how many explain the whole record again.
 const WHOLE: usize = 4;
@@ -34,8 +34,10 @@ pub(crate) struct Regrowth {
     next: Option<usize>,
     /// The first observation that is explained again.
     from: usize,
+    /// Whether `forbidden` applies. `None` of an `Option<Choice>` is not all zero, so a `static` filter would not be in `.bss`.
+    forbids: bool,
     /// How it must not be explained.
-    forbidden: Option<Choice>,
+    forbidden: Choice,
     /// Noise of the ranking.
     temperature: f32,
     seed: u32,
@@ -43,7 +45,8 @@ pub(crate) struct Regrowth {
 
 impl Regrowth {
     /// No regrowth.
-    pub(crate) const NONE: Self = Self { next: None, from: 0, forbidden: None, temperature: 0.0, seed: 0 };
+    pub(crate) const NONE: Self =
+        Self { next: None, from: 0, forbids: false, forbidden: Choice::ZERO, temperature: 0.0, seed: 0 };
 
     /// What forbids the decision of a hypothesis at an observation.
     #[cfg(test)]
@@ -57,7 +60,8 @@ impl Regrowth {
         let mut builder =
             Builder { model: &filter.model, record: &filter.record, translation: &mut filter.translation };
         let step = builder.step(&filter.source, &mut filter.draft, from);
-        Self { from, forbidden: step.map(|step| step.choice), ..Self::NONE }
+        let forbidden = step.map_or(Choice::ZERO, |step| step.choice);
+        Self { from, forbids: step.is_some(), forbidden, ..Self::NONE }
     }
 
     pub(super) fn is_under_way(&self) -> bool {
@@ -66,7 +70,7 @@ impl Regrowth {
 
     /// Whether observation `index` must not be explained like this.
     pub(super) fn forbids(&self, index: usize, choice: Choice) -> bool {
-        self.forbidden == Some(choice) && index == self.from
+        self.forbids && self.forbidden == choice && index == self.from
     }
 
     /// What is added to the score of a map to rank it; the same as long as the map has the same edges.
@@ -91,7 +95,14 @@ impl<const N: usize, const V: usize, const D: usize, const T: usize> OrderedFilt
         let step = builder.step(&self.source, &mut self.draft, from);
         let forbidden = step.map(|step| step.choice).filter(|choice| from > 0 && choice.target != Target::Known);
         let temperature = TEMPERATURE * uniform(random.next_u32());
-        self.regrowth = Regrowth { next: Some(from), from, forbidden, temperature, seed: random.next_u32() };
+        self.regrowth = Regrowth {
+            next: Some(from),
+            from,
+            forbids: forbidden.is_some(),
+            forbidden: forbidden.unwrap_or(Choice::ZERO),
+            temperature,
+            seed: random.next_u32(),
+        };
     }
 
     /// The place after the first passage of a corridor that is drawn from those of the source; the first place if it has none.
