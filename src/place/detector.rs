@@ -299,10 +299,12 @@ impl<const SONARS: usize> PlaceDetector<SONARS> {
         ranges_mm
     }
 
-    /// Follows the way by which the robot came. Along an edge it is straight behind; from the first sighting of a meet point it is
-    /// where the rotation of the ring brings it.
+    /// Follows the way by which the robot came. Along an edge it is straight behind. From the first sighting of a meet point it is
+    /// the opening near the bearing to which the rotation of the ring brings it, because the errors of the rotation add up, or that
+    /// bearing where the sonars show no opening, as in front of a door.
     fn track_way(&mut self, obstacles: &Obstacles) {
-        self.came_by_mrad = rotated(self.came_by_mrad, self.rotation.rotation_mrad());
+        let came_by_mrad = rotated(self.came_by_mrad, self.rotation.rotation_mrad());
+        self.came_by_mrad = self.scan().heard_way(came_by_mrad, obstacles).unwrap_or(came_by_mrad);
         if self.is_at_place || self.sightings > 0 {
             return;
         }

@@ -12,6 +12,8 @@ const SLANTED_WALL_PERCENT: core::ops::Range<u32> = 67..92;
 /// An obstacle within this angle of a way is in it: half the cone of a sonar and half the angle between two sensors, in
 /// milliradians.
 const IN_WAY_MRAD: i32 = 450;
+/// An opening within this angle of where a way must be is that way, in milliradians.
+const SAME_WAY_MRAD: u16 = 700;
 /// Two obstacles within this angle of a way are those beside it, in milliradians.
 const BESIDE_WAY_MRAD: i32 = 1100;
 /// An obstacle more than this angle from a way is opposite to it, in milliradians.
@@ -195,10 +197,19 @@ impl<const SONARS: usize> RingScan<'_, SONARS> {
         let Some(came_by_mrad) = self.came_by_mrad else { return heard };
         let mut obstacles = heard;
         obstacles.split(came_by_mrad);
-        if obstacles.equidistant > heard.equidistant && self.is_joined(came_by_mrad, &obstacles) {
+        if obstacles.equidistant == heard.equidistant || self.heard_way(came_by_mrad, &heard).is_some() {
+            return heard;
+        }
+        if self.is_joined(came_by_mrad, &obstacles) {
             obstacles.spread_mm = obstacles.third_spread_mm();
         }
         obstacles
+    }
+
+    /// The opening that the sonars show where a way must be. The obstacle beside it is then none that hides the way.
+    pub(super) fn heard_way(&self, way_mrad: i16, heard: &Obstacles) -> Option<i16> {
+        let openings = Self { came_by_mrad: None, ..*self }.openings(heard);
+        openings.nearest(way_mrad, SAME_WAY_MRAD).map(|(_, opening_mrad)| opening_mrad)
     }
 
     /// Whether a narrow way is at a meet point: it joins others, or an obstacle is opposite to it. Otherwise the robot passes it.
@@ -469,6 +480,18 @@ mod tests {
             scan.openings(&scan.obstacles()).nearest(3100, 10).map(|(_, bearing_mrad)| bearing_mrad),
             Some(3100)
         );
+    }
+
+    #[test]
+    fn an_obstacle_beside_a_way_that_the_sonars_show_is_one_obstacle() {
+        // Where a corridor ends in a room: the corners behind, and a bearing of the way that is wrong by 0.5 rad.
+        let ring = RingGeometry::even();
+        let ranges_mm = ranges(&[(3, 1640), (4, 1620), (5, 710), (6, 780), (7, 2140), (9, 2090), (10, 860), (11, 750)]);
+        for came_by_mrad in [2640, 3142, -2640] {
+            let scan = scan_of_16(&ranges_mm, &ring, Some(came_by_mrad));
+            assert_eq!(scan.obstacles().equidistant().count(), 2, "{came_by_mrad}");
+            assert!(scan.obstacles().spread_mm().is_none_or(|spread_mm| spread_mm > 600), "{came_by_mrad}");
+        }
     }
 
     #[test]
