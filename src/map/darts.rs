@@ -9,12 +9,26 @@ use super::dart::{Bearing, Dart, Darts, NONE, VertexWays, WAYS_MAX};
 /// in the order in which they were added. Loops and parallel edges are ordinary edges.
 ///
 /// Memory: 8 bytes a vertex and 8 bytes a dart.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Debug, PartialEq, Eq)]
 pub struct DartMap<const V: usize, const D: usize> {
     vertices: u8,
     darts: u8,
     ways: [VertexWays; V],
     dart: [Dart; D],
+}
+
+impl<const V: usize, const D: usize> Clone for DartMap<V, D> {
+    fn clone(&self) -> Self {
+        Self { ..*self }
+    }
+
+    /// In place: a map is too large for a temporary on the stack of a microcontroller.
+    fn clone_from(&mut self, source: &Self) {
+        self.vertices = source.vertices;
+        self.darts = source.darts;
+        self.ways = source.ways;
+        self.dart = source.dart;
+    }
 }
 
 impl<const V: usize, const D: usize> DartMap<V, D> {

@@ -16,7 +16,7 @@ pub(super) const LN_OFF_MAP: f32 = -20.0;
 /// The largest number of darts of a hypothesis.
 pub(super) const DARTS_MAX: usize = 253;
 
-#[derive(Clone, Debug)]
+#[derive(Debug)]
 pub(crate) struct Hypothesis<const V: usize, const D: usize, const T: usize> {
     pub(crate) map: DartMap<V, D>,
     pub(crate) labels: [Label; V],
@@ -29,6 +29,23 @@ pub(crate) struct Hypothesis<const V: usize, const D: usize, const T: usize> {
     pub(crate) map_key: u32,
     /// The way by which the robot came to each place of the record.
     pub(crate) path: [u8; T],
+}
+
+impl<const V: usize, const D: usize, const T: usize> Clone for Hypothesis<V, D, T> {
+    fn clone(&self) -> Self {
+        Self { map: self.map.clone(), ..*self }
+    }
+
+    /// In place: a hypothesis is too large for a temporary on the stack of a microcontroller.
+    fn clone_from(&mut self, source: &Self) {
+        self.map.clone_from(&source.map);
+        self.labels = source.labels;
+        self.at = source.at;
+        self.label_evidence = source.label_evidence;
+        self.rest = source.rest;
+        self.map_key = source.map_key;
+        self.path = source.path;
+    }
 }
 
 impl<const V: usize, const D: usize, const T: usize> Hypothesis<V, D, T> {

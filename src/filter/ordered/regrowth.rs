@@ -16,7 +16,7 @@ use rand_core::Rng;
 use rand_xoshiro::Xoshiro128PlusPlus;
 
 /// A step stops after the place at which it has computed this many explanations.
-const EXPLANATIONS: usize = 240;
+const EXPLANATIONS: usize = 180;
 
 /// Of 16 regrowths, how many explain the whole record again.
 const WHOLE: usize = 4;
