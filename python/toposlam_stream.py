@@ -277,6 +277,7 @@ class FaultKind(enum.IntEnum):
     DRIVE_LOST = 14
     LOOP_LATE = 15
     INVALID_HINT = 16
+    SONAR_IMPLAUSIBLE = 17
 
 
 class GoalState(enum.IntEnum):
