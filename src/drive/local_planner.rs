@@ -41,7 +41,7 @@ const LOOK_ROUND_MRAD: i16 = 180;
 const LOOK_ROUND_FRAMES: u16 = 8;
 /// After as many returns to a place the robot is lost: no exit leads on.
 const MAX_RETURNS: u8 = 4;
-/// A door is hidden when a sonar within this angle of it hears its jambs, in milliradians.
+/// A door is hidden when a sonar within this angle of it measures its jambs, in milliradians.
 const HIDDEN_MRAD: i32 = 200;
 /// Back is the exit within this angle of the way by which the robot came, in milliradians.
 const BACK_MRAD: i32 = 400;
@@ -477,7 +477,7 @@ impl LocalPlanner {
         }
         let facing_mrad = facing_mrad(scan);
         if i32::from(self.target_mrad).abs() <= facing_mrad {
-            // With the sensors ahead dead the exit is not seen, and the estimate has to do.
+            // With the sensors ahead dead the exit is not seen, and the estimate replaces it.
             let is_certain = seen.is_some() || facing_mrad > FACING_MRAD;
             if is_certain {
                 // The way by which the robot came and the exit are tracked separately. When they do not agree, one of them is another opening.

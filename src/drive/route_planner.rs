@@ -84,7 +84,7 @@ struct RefusedWay {
 impl RefusedWay {
     const NONE: Self = Self { vertex: VertexId::FIRST, bearing: 0, times: 0 };
 
-    /// Whether this is a way of the map with at least so many refusals.
+    /// Whether this is a way of the map, refused at least `times` times.
     fn is(&self, darts: Darts<'_>, way: DartId, times: u8) -> bool {
         let off = darts.bearing(way).unwrap_or(0).wrapping_sub(self.bearing) as i16;
         self.times >= times && darts.vertex(way) == Some(self.vertex) && off.unsigned_abs() <= SAME_WAY

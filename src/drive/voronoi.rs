@@ -10,7 +10,7 @@ use crate::ring::Echo;
 
 /// Ahead is within this angle of straight ahead, in milliradians.
 const AHEAD_MRAD: i16 = 1047;
-/// A wall is heard this far off its normal, in milliradians: silence nearer to the normal is a gap.
+/// A wall is measured this far off its normal, in milliradians: silence nearer to the normal is a gap.
 const GAP_MRAD: i32 = 720;
 
 /// The sector in which the obstacle on the left is searched, counter-clockwise from the heading; mirrored on the right.

@@ -90,7 +90,7 @@ pub struct PlaceDetector<const SONARS: usize> {
     smoother: RangeSmoother<SONARS>,
     /// The newest frame, smoothed.
     smooth_mm: [u16; SONARS],
-    /// Its obstacles, as the sonars hear them.
+    /// Its obstacles, as the sonars measure them.
     heard: Obstacles,
     frame_index: u32,
     rotation: RotationEstimate,

@@ -219,7 +219,7 @@ impl<const SONARS: usize> RingScan<'_, SONARS> {
         obstacles.equidistant().any(is_opposite) || self.openings(obstacles).count() > 2
     }
 
-    /// The closest obstacles as the sonars hear them.
+    /// The closest obstacles as the sonars measure them.
     #[inline(never)]
     pub(super) fn heard_obstacles(&self) -> Obstacles {
         let mut obstacles = self.closest(|index, bearing_mrad, found| self.is_apart(index, bearing_mrad, found));
@@ -468,7 +468,7 @@ mod tests {
 
     #[test]
     fn an_obstacle_in_the_way_by_which_the_robot_came_is_the_two_beside_it() {
-        // Out of a door, 1 m in front of the opposite wall of a corridor: one sonar hears both jambs.
+        // Out of a door, 1 m in front of the opposite wall of a corridor: one sonar measures both jambs.
         let ring = RingGeometry::even();
         let ranges_mm = ranges(&[(0, 1000), (1, 1010), (15, 1015), (8, 1040), (7, 1060), (9, 1065)]);
         let scan = scan_of_16(&ranges_mm, &ring, None);

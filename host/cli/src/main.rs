@@ -20,7 +20,7 @@ enum Task {
     Explore(command::explore::Arguments),
     /// Run the firmware in an emulated STM32F405, and compare its map with that of `simulate` bit for bit.
     Emulate(command::emulate::Arguments),
-    /// List and draw the places of a floor plan that a robot can tell apart.
+    /// List and draw the places of a floor plan that a robot can distinguish.
     Plan(command::plan::Arguments),
     /// Simulate a robot for hours with injected faults and an operator, and check its fault counters.
     Soak(command::soak::Arguments),

@@ -108,7 +108,7 @@ fn warn(truth: &TrueMap, limits: &Limits) {
     for (index, node) in truth.nodes.iter().enumerate() {
         if node.is_hall {
             println!(
-                "warning: place {index} is farther from its walls than the sonars hear ({:.0} mm)",
+                "warning: place {index} is farther from its walls than the sonars measure ({:.0} mm)",
                 limits.range_max_mm
             );
         }

@@ -1,4 +1,4 @@
-//! Places and the ways between them, joined where a robot cannot tell them apart.
+//! Places and the ways between them, joined where a robot cannot distinguish them.
 
 use super::obstacles::Obstacles;
 use super::truth::narrowest_mm;
@@ -62,7 +62,7 @@ impl Graph {
         self.nodes.push(Node { position, radius_mm, meet_points: vec![position], is_apart });
     }
 
-    /// Joins the places in the middle of a hall, where the sonars hear nothing, to one; none is left where the way does not fork.
+    /// Joins the places in the middle of a hall, where the sonars measure nothing, to one; none is left where the way does not fork.
     /// Returns how many meet points are gone.
     pub(super) fn join_halls(&mut self, walls: &Walls, limits: &Limits) -> usize {
         let before = self.nodes.len();

@@ -1,4 +1,4 @@
-//! The obstacles that a place detector can tell apart at a point: the nearest points of walls in separate bearings.
+//! The obstacles that a place detector can distinguish at a point: the nearest points of walls in separate bearings.
 
 use std::f64::consts::TAU;
 

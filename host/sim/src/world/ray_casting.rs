@@ -93,7 +93,7 @@ pub(super) fn wrapped(angle_rad: f64) -> f64 {
     (angle_rad + PI).rem_euclid(TAU) - PI
 }
 
-/// What the ring hears of a floor plan.
+/// What the ring measures of a floor plan.
 pub(super) struct Scene {
     plan: Plan,
 }

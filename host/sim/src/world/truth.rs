@@ -1,4 +1,4 @@
-//! The true map of a floor plan: what a robot of a given size with given sonars can tell (docs/plans.md has the definition).
+//! The true map of a floor plan: what a robot of a given size with given sonars can distinguish (docs/plans.md has the definition).
 
 use super::branches::prune;
 use super::graph::Graph;
@@ -16,17 +16,17 @@ const AS_NEAR_SHARE: f64 = 0.1;
 /// Room that a robot needs beside its body, in millimetres: two standard deviations of a range.
 const PLAY_MM: f64 = 30.0;
 
-/// What a robot can drive through and tell apart.
+/// What a robot can drive through and distinguish.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Limits {
     /// Half the robot's width, in millimetres.
     pub body_radius_mm: f64,
-    /// Nothing farther is heard, in millimetres.
+    /// Nothing farther is measured, in millimetres.
     pub range_max_mm: f64,
     /// Obstacles at least this far apart in bearing are two, in radians.
     pub separation_rad: f64,
     /// Obstacles closer by up to this are two where the range between them rises, in radians: half the cone of a sonar, because an
-    /// obstacle is heard up to that far aside.
+    /// obstacle is measured up to that far aside.
     pub cone_half_angle_rad: f64,
     /// A place is left when the third obstacle is this much farther than the nearest, in millimetres.
     pub leave_mm: f64,

@@ -7,7 +7,7 @@ use super::grid::{Buckets, Grid};
 
 /// Two walls that meet at a smaller angle are one smooth wall; at a larger angle they meet in a corner that scatters sound.
 const CORNER_RAD: f64 = 30.0 * std::f64::consts::PI / 180.0;
-/// The point of a bucket that tells free space from wall, as shares of its side: no wall with integer coordinates runs through it.
+/// The point of a bucket that decides between free space and wall, as shares of its side: no wall with integer coordinates runs through it.
 const PROBE: (f64, f64) = (0.463_712_9, 0.531_173_7);
 
 /// A corner of a wall, in whole millimetres.
