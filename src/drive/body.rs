@@ -143,22 +143,9 @@ pub(super) fn widest_room_mrad<const SONARS: usize>(scan: &RingScan<'_, SONARS>,
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::place::{PlaceConfig, PlaceDetector};
-    use crate::ring::{RingFrame, RingGeometry};
+    use crate::drive::test_ring::detector;
 
     const BODY_MM: u16 = 150;
-
-    /// A detector whose scan has these ranges, by sensor of an even ring; the other sensors receive no echo.
-    fn detector(ranges_mm: &[(usize, u16)]) -> PlaceDetector<16> {
-        let mut frame = RingFrame { echoes: [Echo::Silence; 16] };
-        for &(sensor, range_mm) in ranges_mm {
-            frame.echoes[sensor] = Echo::Range { range_mm };
-        }
-        let mut detector = PlaceDetector::new();
-        detector.start(PlaceConfig::DEFAULT, RingGeometry::even()).unwrap();
-        detector.observe(&frame);
-        detector
-    }
 
     fn is_blocked(ranges_mm: &[(usize, u16)]) -> bool {
         let detector = detector(ranges_mm);

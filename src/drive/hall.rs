@@ -147,18 +147,11 @@ fn is_beside(obstacle: Option<Obstacle>) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::place::{PlaceConfig, PlaceDetector};
-    use crate::ring::{Echo, RingFrame, RingGeometry};
+    use crate::drive::test_ring::detector;
 
     /// The heading after some frames with these ranges, by sensor of an even ring; the other sensors receive no echo.
     fn heading_mrad(hall: &mut Hall, frames: u16, ranges_mm: &[(usize, u16)]) -> Option<i16> {
-        let mut frame = RingFrame { echoes: [Echo::Silence; 16] };
-        for &(sensor, range_mm) in ranges_mm {
-            frame.echoes[sensor] = Echo::Range { range_mm };
-        }
-        let mut detector = PlaceDetector::new();
-        detector.start(PlaceConfig::DEFAULT, RingGeometry::even()).unwrap();
-        detector.observe(&frame);
+        let detector = detector(ranges_mm);
         (0..frames).map(|_| hall.heading_mrad(&detector.scan())).last().flatten()
     }
 

@@ -28,6 +28,8 @@ mod hall;
 mod local_planner;
 mod route_planner;
 mod routes;
+#[cfg(test)]
+mod test_ring;
 mod voronoi;
 mod wheels;
 

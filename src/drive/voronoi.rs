@@ -124,20 +124,7 @@ pub(super) fn meet_point_offset_mm(obstacles: &Obstacles) -> Option<Vector> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::place::{PlaceConfig, PlaceDetector};
-    use crate::ring::{RingFrame, RingGeometry};
-
-    /// A detector whose scan has these ranges, by sensor of an even ring; the other sensors receive no echo.
-    fn detector(ranges_mm: &[(usize, u16)]) -> PlaceDetector<16> {
-        let mut frame = RingFrame { echoes: [Echo::Silence; 16] };
-        for &(sensor, range_mm) in ranges_mm {
-            frame.echoes[sensor] = Echo::Range { range_mm };
-        }
-        let mut detector = PlaceDetector::new();
-        detector.start(PlaceConfig::DEFAULT, RingGeometry::even()).unwrap();
-        detector.observe(&frame);
-        detector
-    }
+    use crate::drive::test_ring::detector;
 
     fn edge(ranges_mm: &[(usize, u16)]) -> Option<i16> {
         edge_heading_mrad(&detector(ranges_mm).scan(), Sector::EDGE, 400)

@@ -413,25 +413,11 @@ mod tests {
         {
             ranges_mm[index] = range_mm;
         }
-        let scan = |ranges_mm| RingScan {
-            ranges_mm,
-            geometry: &ring,
-            separation_mrad: 1047,
-            equidistance_mm: 150,
-            came_by_mrad: None,
-        };
-        let scan = scan(&ranges_mm);
+        let scan = scan_of_16(&ranges_mm, &ring, None);
         assert_eq!(scan.obstacles().iter().count(), 2, "{:?}", scan.obstacles());
         // The same echo without an echo beside it is a separate obstacle.
         ranges_mm[3] = SILENT_MM;
-        let scan = |ranges_mm| RingScan {
-            ranges_mm,
-            geometry: &ring,
-            separation_mrad: 1047,
-            equidistance_mm: 150,
-            came_by_mrad: None,
-        };
-        let scan = scan(&ranges_mm);
+        let scan = scan_of_16(&ranges_mm, &ring, None);
         assert_eq!(scan.obstacles().iter().count(), 3, "{:?}", scan.obstacles());
     }
 
