@@ -1,6 +1,6 @@
 //! Topological SLAM from a sequence of places: the interface of a filter, the robust filter, and the paper's filter.
 
-mod beam;
+pub(crate) mod beam;
 mod interface;
 mod observation;
 pub(crate) mod ordered;

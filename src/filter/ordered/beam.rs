@@ -5,7 +5,7 @@ use super::hypothesis::Hypothesis;
 use super::model::Model;
 use super::record::Record;
 use super::regrowth::Regrowth;
-use crate::filter::beam::{self, Candidate, Ranked};
+use crate::filter::beam::{self, Candidate, Ranked as _};
 use crate::map::NONE;
 
 /// Exits that cost more than this are not considered on line, in nats.
@@ -26,22 +26,6 @@ pub(super) struct Growth {
 /// Up to `N` hypotheses. No two have the same map and the same place.
 pub(crate) type Beam<const N: usize, const V: usize, const D: usize, const T: usize> =
     beam::Beam<Hypothesis<V, D, T>, N>;
-
-impl<const V: usize, const D: usize, const T: usize> Ranked for Hypothesis<V, D, T> {
-    const UNUSED: Self = Self::ZERO;
-
-    fn clear(&mut self) {
-        Self::clear(self);
-    }
-
-    fn score(&self) -> f32 {
-        Self::score(self)
-    }
-
-    fn key(&self) -> u32 {
-        Self::key(self)
-    }
-}
 
 impl<const N: usize, const V: usize, const D: usize, const T: usize> Beam<N, V, D, T> {
     /// Takes observation `index` of the record: of all explanations by all hypotheses the best `N` distinct ones stay. A regrowth

@@ -210,6 +210,7 @@ pub(super) fn fit<const V: usize, const D: usize, const T: usize>(
 mod tests {
     use super::super::config::OrderedConfig;
     use super::*;
+    use crate::filter::beam::Ranked as _;
     use std::collections::BTreeSet;
 
     type Small = Hypothesis<24, 96, 8>;
@@ -221,7 +222,7 @@ mod tests {
     /// `copies` of the building, an edge of copy `i` leading to copy `i + shift(dart)`: a covering map, which folds onto the
     /// building.
     fn cover(copies: usize, shift: impl Fn(usize) -> usize) -> Small {
-        let mut hypothesis = Small::ZERO;
+        let mut hypothesis = Small::UNUSED;
         let mut partner = Vec::new();
         for _ in 0..copies {
             for (place, ways) in BUILDING.iter().enumerate() {

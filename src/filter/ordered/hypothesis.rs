@@ -5,6 +5,7 @@ use super::label::Label;
 use super::model::{LN_WAYS, Model, SAME_WAY};
 use super::record::{Entry, Record};
 use crate::filter::Exit;
+use crate::filter::beam::Ranked;
 use crate::map::{Bearing, DartMap, NONE, WAYS_MAX};
 
 /// Labels that are this many standard deviations off are not looked at.
@@ -31,6 +32,35 @@ pub(crate) struct Hypothesis<const V: usize, const D: usize, const T: usize> {
     pub(crate) path: [u8; T],
 }
 
+impl<const V: usize, const D: usize, const T: usize> Ranked for Hypothesis<V, D, T> {
+    const UNUSED: Self = Self {
+        map: DartMap::EMPTY,
+        labels: [Label::NONE; V],
+        at: 0,
+        label_evidence: 0.0,
+        rest: 0.0,
+        map_key: 0,
+        path: [0; T],
+    };
+
+    fn clear(&mut self) {
+        self.map.clear();
+        self.labels.fill(Label::NONE);
+        self.at = NONE;
+        self.label_evidence = 0.0;
+        self.rest = 0.0;
+        self.map_key = 0;
+    }
+
+    fn score(&self) -> f32 {
+        self.label_evidence + self.rest
+    }
+
+    fn key(&self) -> u32 {
+        keyed(self.map_key, self.at)
+    }
+}
+
 impl<const V: usize, const D: usize, const T: usize> Clone for Hypothesis<V, D, T> {
     fn clone(&self) -> Self {
         Self { map: self.map.clone(), ..*self }
@@ -49,30 +79,6 @@ impl<const V: usize, const D: usize, const T: usize> Clone for Hypothesis<V, D, 
 }
 
 impl<const V: usize, const D: usize, const T: usize> Hypothesis<V, D, T> {
-    /// All zero. It has to be cleared before its first use.
-    pub(super) const ZERO: Self = Self {
-        map: DartMap::EMPTY,
-        labels: [Label::NONE; V],
-        at: 0,
-        label_evidence: 0.0,
-        rest: 0.0,
-        map_key: 0,
-        path: [0; T],
-    };
-
-    pub(crate) fn clear(&mut self) {
-        self.map.clear();
-        self.labels.fill(Label::NONE);
-        self.at = NONE;
-        self.label_evidence = 0.0;
-        self.rest = 0.0;
-        self.map_key = 0;
-    }
-
-    pub(super) fn score(&self) -> f32 {
-        self.label_evidence + self.rest
-    }
-
     pub(super) fn label(&self, vertex: u8) -> Label {
         self.labels.get(usize::from(vertex)).copied().unwrap_or(Label::NONE)
     }
@@ -80,10 +86,6 @@ impl<const V: usize, const D: usize, const T: usize> Hypothesis<V, D, T> {
     /// The way that the robot came by at a place of the record.
     pub(super) fn came_by(&self, index: usize) -> u8 {
         self.path.get(index).copied().unwrap_or(NONE)
-    }
-
-    pub(super) fn key(&self) -> u32 {
-        keyed(self.map_key, self.at)
     }
 
     /// Weighs all labels again, for a new scale of the noise.

@@ -38,6 +38,7 @@ use super::vertex_ids::VertexIds;
 use super::{Exit, Filter, FilterCapacities, Observation, Update, WorstNgram, worst_ngram};
 use crate::config_error::ConfigError;
 use crate::fault::{FaultCounters, FaultKind};
+use crate::filter::beam::Ranked as _;
 use crate::map::{DartId, DartMap, Darts, Map, NONE, PerVertex, VertexId};
 use beam::Beam;
 use fold::Union;
@@ -127,14 +128,14 @@ impl<const N: usize, const V: usize, const D: usize, const T: usize> OrderedFilt
             localised_from: None,
             record: Record::new(),
             beam: Beam::new(),
-            draft: Hypothesis::ZERO,
-            source: Hypothesis::ZERO,
+            draft: Hypothesis::UNUSED,
+            source: Hypothesis::UNUSED,
             translation: Translation::new(),
             union: Union::new(),
             repair: Repair::NONE,
             regrowth: Regrowth::NONE,
             regrown: Beam::new(),
-            base: Hypothesis::ZERO,
+            base: Hypothesis::UNUSED,
             vertex_ids: VertexIds::new(),
             map: Map::new(),
             darts: DartMap::EMPTY,

@@ -3,6 +3,7 @@
 use super::OrderedFilter;
 use super::choice::UNSEEN;
 use super::hypothesis::Hypothesis;
+use crate::filter::beam::Ranked as _;
 use crate::filter::worst_ngram::worst_ngram;
 use crate::filter::{OrderedFactors, Update, WeightFactors};
 use crate::map::{DartId, NONE, VertexId};

@@ -12,6 +12,7 @@ use super::hypothesis::mix;
 use super::logarithm::{gumbel, uniform};
 use super::repair::below;
 use super::replay::Builder;
+use crate::filter::beam::Ranked as _;
 use rand_core::Rng;
 use rand_xoshiro::Xoshiro128PlusPlus;
 

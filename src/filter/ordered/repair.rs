@@ -12,6 +12,7 @@ use super::hypothesis::Hypothesis;
 use super::logarithm::{self, uniform};
 use super::regrowth::Regrowth;
 use super::replay::Builder;
+use crate::filter::beam::Ranked as _;
 use crate::filter::draws;
 use crate::map::NONE;
 use rand_core::Rng;

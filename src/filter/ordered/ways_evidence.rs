@@ -152,6 +152,7 @@ mod tests {
     use super::super::config::OrderedConfig;
     use super::super::label::Label;
     use super::*;
+    use crate::filter::beam::Ranked as _;
     use crate::filter::{Observation, Ways};
     use crate::place::Fingerprint;
 
@@ -164,7 +165,7 @@ mod tests {
 
     /// A vertex with ways: their bearings in radians and how often each was seen.
     fn vertex(ways: &[(f64, u8)], looks: u8) -> Small {
-        let mut hypothesis = Small::ZERO;
+        let mut hypothesis = Small::UNUSED;
         let vertex = hypothesis.map.add_vertex().unwrap();
         for &(bearing_rad, seen) in ways {
             let bearing = (bearing_rad / core::f64::consts::TAU * 65536.0) as u16;

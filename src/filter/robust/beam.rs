@@ -3,27 +3,11 @@
 use super::history::{ObservationHistory, PackedObservation};
 use super::hypothesis::Hypothesis;
 use super::model::Model;
-use crate::filter::beam::{self, Candidate, Ranked};
+use crate::filter::beam::{self, Candidate, Ranked as _};
 use crate::map::VertexId;
 
 /// Up to `N` hypotheses, of which no two have the same map and vertex of the robot.
 pub(crate) type Beam<const N: usize, const V: usize, const T: usize> = beam::Beam<Hypothesis<V, T>, N>;
-
-impl<const V: usize, const T: usize> Ranked for Hypothesis<V, T> {
-    const UNUSED: Self = Self::EMPTY;
-
-    fn clear(&mut self) {
-        Self::clear(self);
-    }
-
-    fn score(&self) -> f32 {
-        Self::score(self)
-    }
-
-    fn key(&self) -> u32 {
-        Self::key(self)
-    }
-}
 
 impl<const N: usize, const V: usize, const T: usize> Beam<N, V, T> {
     /// Adds the newest observation, number `index` of the history: the best `wanted` distinct predictions of all hypotheses

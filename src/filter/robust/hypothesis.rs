@@ -3,6 +3,7 @@
 use super::history::ObservationHistory;
 use super::model::{LN_EDGE, LN_VERTEX, Model};
 use super::statistics::VertexStatistics;
+use crate::filter::beam::Ranked;
 use crate::map::{PerVertex, VertexId, VertexSet32};
 
 /// The cost of a path that stays at one vertex for two observations, in nats: such a hypothesis is never kept.
@@ -42,8 +43,8 @@ pub(crate) struct Hypothesis<const V: usize, const T: usize> {
     pub(crate) marginalised_neighbours: PerVertex<VertexSet32, V>,
 }
 
-impl<const V: usize, const T: usize> Hypothesis<V, T> {
-    pub(crate) const EMPTY: Self = Self {
+impl<const V: usize, const T: usize> Ranked for Hypothesis<V, T> {
+    const UNUSED: Self = Self {
         vertices: 0,
         at: None,
         before: None,
@@ -60,8 +61,7 @@ impl<const V: usize, const T: usize> Hypothesis<V, T> {
         marginalised_neighbours: PerVertex::filled(VertexSet32::EMPTY),
     };
 
-    /// Removes all vertices.
-    pub(crate) fn clear(&mut self) {
+    fn clear(&mut self) {
         self.vertices = 0;
         self.at = None;
         self.before = None;
@@ -77,16 +77,17 @@ impl<const V: usize, const T: usize> Hypothesis<V, T> {
         self.marginalised_neighbours.fill(VertexSet32::EMPTY);
     }
 
-    /// The rank of the hypothesis: the evidence of the map, with the share of its other paths.
-    pub(crate) fn score(&self) -> f32 {
+    fn score(&self) -> f32 {
+        // The evidence of the map, with the share of its other paths.
         self.evidence + self.other_paths
     }
 
-    /// Identifies the map and the robot's vertex.
-    pub(crate) fn key(&self) -> u32 {
+    fn key(&self) -> u32 {
         keyed(self.map_key, self.vertices, self.at)
     }
+}
 
+impl<const V: usize, const T: usize> Hypothesis<V, T> {
     /// Identifies the map alone.
     pub(crate) fn map_alone_key(&self) -> u32 {
         keyed(self.map_key, self.vertices, Some(VertexId::FIRST))

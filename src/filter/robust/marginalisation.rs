@@ -4,6 +4,7 @@ use super::history::ObservationHistory;
 use super::hypothesis::{Hypothesis, join};
 use super::model::Model;
 use super::statistics::VertexStatistics;
+use crate::filter::beam::Ranked as _;
 use crate::map::Map;
 use crate::map::VertexSet32;
 
@@ -68,7 +69,7 @@ mod tests {
         let mut model = Model::new();
         model.configure(&RobustConfig::DEFAULT);
         let mut history = ObservationHistory::<8>::new();
-        let mut hypothesis = Hypothesis::<4, 8>::EMPTY;
+        let mut hypothesis = Hypothesis::<4, 8>::UNUSED;
         hypothesis.clear();
         hypothesis.vertices = 3;
         // The first observation has no edge, because the second one starts a sequence.

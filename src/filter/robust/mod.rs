@@ -46,6 +46,7 @@ use super::{Filter, FilterCapacities, Update, WorstNgram, draws, worst_ngram};
 use crate::config_error::ConfigError;
 use crate::fault::FaultCounters;
 use crate::filter::Observation;
+use crate::filter::beam::Ranked as _;
 use crate::map::PerVertex;
 use crate::map::{Map, VertexId};
 use crate::place::Fingerprint;
@@ -123,7 +124,7 @@ impl<const N: usize, const V: usize, const HISTORY: usize> RobustFilter<N, V, HI
             model: Model::new(),
             history: ObservationHistory::new(),
             beam: Beam::new(),
-            draft: Hypothesis::EMPTY,
+            draft: Hypothesis::UNUSED,
             hmm: Hmm::new(),
             lattice: Lattice::new(),
             viterbi: Viterbi::new(),

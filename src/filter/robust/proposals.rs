@@ -7,6 +7,7 @@ use super::hypothesis::Hypothesis;
 use super::lattice::Lattice;
 use super::model::Model;
 use super::viterbi::Viterbi;
+use crate::filter::beam::Ranked as _;
 use crate::map::{VertexId, VertexSet32};
 use rand_core::Rng;
 use rand_xoshiro::Xoshiro128PlusPlus;

@@ -1,6 +1,7 @@
 //! What the filter publishes after a place: the best map with its vertex ids, the belief, and the probability of the map.
 
 use super::RobustFilter;
+use crate::filter::beam::Ranked as _;
 use crate::filter::worst_ngram::worst_ngram;
 use crate::filter::{RobustFactors, Update, WeightFactors, WorstNgram};
 use crate::map::VertexId;

@@ -3,6 +3,7 @@
 use super::{RobustFilter, noise};
 use crate::fault::FaultKind;
 use crate::filter::Observation;
+use crate::filter::beam::Ranked as _;
 use crate::filter::{Filter, Update};
 use crate::place::Fingerprint;
 

@@ -1,6 +1,7 @@
 //! For tests and evaluations alone: a search that starts at a given path.
 
 use super::RobustFilter;
+use crate::filter::beam::Ranked as _;
 use crate::map::VertexId;
 
 impl<const N: usize, const V: usize, const HISTORY: usize> RobustFilter<N, V, HISTORY> {

@@ -1,6 +1,7 @@
 //! A hypothesis in a snapshot: its map with its ways, the labels, and the way by which the robot came to each place.
 
 use super::NOWHERE;
+use crate::filter::beam::Ranked as _;
 use crate::filter::ordered::{OFF_MAP, OrderedHypothesis as Hypothesis, OrderedLabel as Label};
 use crate::map::DartMap;
 use crate::persist::snapshot::{Reader, SnapshotError, Writer};

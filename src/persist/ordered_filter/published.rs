@@ -3,6 +3,7 @@
 use super::NOWHERE;
 use super::hypothesis::{is_way, map_bytes, read_path};
 use crate::filter::OrderedFilter;
+use crate::filter::beam::Ranked as _;
 use crate::map::{VertexId, VertexSet};
 use crate::persist::snapshot::{Reader, SnapshotError, Writer};
 use crate::place::Fingerprint;

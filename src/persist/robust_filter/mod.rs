@@ -7,6 +7,7 @@ mod hypothesis;
 mod parts;
 
 use crate::fault::FaultCounters;
+use crate::filter::beam::Ranked as _;
 use crate::filter::{RobustConfig, RobustFilter};
 use crate::persist::Persist;
 use crate::persist::snapshot::{FILTER_SECTION, FRAME_BYTES, ROBUST, Reader, SnapshotError, Writer};
