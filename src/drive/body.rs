@@ -1,13 +1,12 @@
 //! What the body of the robot allows: gaps that are too narrow for it, corners that lead nowhere, and walls that hold it.
 
+use super::voronoi::Sector;
 use crate::bearing::turn_mrad;
 use crate::place::{Obstacle, RingScan};
 use crate::ring::Echo;
 
 /// The gap beside the body that the robot leaves on each side, in millimetres.
 const PLAY_MM: u16 = 20;
-/// Obstacles at a larger angle from straight ahead have been passed, in milliradians: 100°.
-const AHEAD_MRAD: i16 = 1745;
 /// Two walls of a corner ahead are within this angle of straight ahead, in milliradians: 70°,
 const CORNER_MRAD: i16 = 1222;
 /// and the corner is nearer than this percentage of their range.
@@ -105,9 +104,7 @@ impl Body {
 
 /// Whether the gap between the obstacles on both sides is narrower than the body, or these are the walls of a corner.
 fn is_narrow<const SONARS: usize>(scan: &RingScan<'_, SONARS>, ahead: Option<Obstacle>, body_radius_mm: u16) -> bool {
-    let left = scan.nearest_between(350, AHEAD_MRAD);
-    let right = scan.nearest_between(-AHEAD_MRAD, -350);
-    let (Some(left), Some(right)) = (left, right) else { return false };
+    let (Some(left), Some(right)) = Sector::AHEAD.sides(scan) else { return false };
     let mean_mm = left.range_mm / 2 + right.range_mm / 2;
     if mean_mm < body_radius_mm.saturating_add(PLAY_MM) {
         return true;

@@ -1,25 +1,22 @@
 //! Drives from one place to the next: along an edge, to the meet point, and out by the chosen exit.
 
 use super::body::{Body, widest_room_mrad};
+use super::frame::{FACING_MRAD, Frame};
 use super::hall::Hall;
-use super::voronoi::{Sector, beside_mm, edge_heading_mrad, gap_ahead_mrad, meet_point_offset_mm};
+use super::voronoi::{AHEAD_MRAD, Sector, edge_heading_mrad, meet_point_offset_mm};
+use super::way_back::WayBack;
 use super::{DriveConfig, VelocityCommand};
-use crate::bearing::{HALF_TURN_MRAD, Vector, counter_clockwise_mrad, rotated, turn_mrad};
+use crate::bearing::{HALF_TURN_MRAD, counter_clockwise_mrad, rotated, turn_mrad};
 use crate::config_error::ConfigError;
 use crate::fault::{FaultCounters, FaultKind};
 use crate::filter::{Exit, Passage};
-use crate::place::{Obstacle, Obstacles, Openings, PlaceDetector, RingScan};
-use crate::ring::Echo;
+use crate::place::{Obstacles, Openings};
 use crate::top_k::TopK;
 
 /// An opening is matched to the one of the frame before when its bearing changed by at most this, in milliradians.
 const SAME_OPENING_MRAD: u16 = 700;
 /// The same in a frame that shows another number of openings.
 const DOUBTFUL_OPENING_MRAD: u16 = 350;
-/// The robot faces an exit within this angle of straight ahead, in milliradians. Sensors within it look ahead.
-const FACING_MRAD: i32 = 200;
-/// Where all sensors within [`FACING_MRAD`] are dead, sensors within this angle replace them, in milliradians.
-const FACING_BESIDE_DEAD_MRAD: i32 = 600;
 /// Limit of the heading of a turn in place, in milliradians: with the default wheels the ring turns by 72 mrad per frame, so that the
 /// smoothed ranges of a sensor are from one direction.
 const TURN_MRAD: i16 = 300;
@@ -41,16 +38,8 @@ const LOOK_ROUND_MRAD: i16 = 180;
 const LOOK_ROUND_FRAMES: u16 = 8;
 /// After as many returns to a place the robot is lost: no exit leads on.
 const MAX_RETURNS: u8 = 4;
-/// A door is hidden when a sonar within this angle of it measures its jambs, in milliradians.
-const HIDDEN_MRAD: i32 = 200;
 /// Back is the exit within this angle of the way by which the robot came, in milliradians.
 const BACK_MRAD: i32 = 400;
-/// The position of a gap is known to about this distance, in thousandths of the way of a frame at full speed.
-const HOME_PERMILLE: i32 = 10_000;
-/// Obstacles at a larger angle from straight ahead have been passed, in milliradians: 100°.
-const AHEAD_MRAD: i16 = 1745;
-/// With a command beyond this bearing the robot turns in place, in milliradians.
-const IN_PLACE_MRAD: u16 = 600;
 /// After this many frames it drives out where the exit must be. A robot that follows the wall of a hall leaves a meet point that the detector
 /// has not confirmed in this time, and approaches none for the same time.
 const SEARCH_FRAMES: u16 = 24;
@@ -120,8 +109,6 @@ pub(super) struct LocalPlanner {
     entry_mrad: i16,
     /// Bearing of the chosen exit, or of the direction to recover to.
     target_mrad: i16,
-    /// Change of all bearings since the frame before.
-    rotation_mrad: i32,
     /// The ways of the place by the detector, in the newest frame.
     ways: Openings,
     /// Its exits.
@@ -130,16 +117,7 @@ pub(super) struct LocalPlanner {
     returns: u8,
     /// Frames in which the robot faced its exit and did not see it.
     search_frames: u16,
-    /// Where the narrowest point of the edge is, in thousandths of the way of a ring frame at full speed,
-    gap: Vector,
-    /// and the range of the obstacles beside it; 0 when the point is unknown.
-    gap_mm: u16,
-    /// The radius of the place that the robot left last.
-    radius_mm: u16,
-    /// Whether the robot drives back to that point, without regard to the obstacles beside it.
-    is_homing: bool,
-    /// The distance of the last frame, in thousandths of the way of a frame at full speed.
-    forward_permille: u16,
+    way_back: WayBack,
     departure: Departure,
     /// Whether the robot turned back on its way to the next place.
     is_returning: bool,
@@ -158,16 +136,11 @@ impl LocalPlanner {
             frames: 0,
             entry_mrad: 0,
             target_mrad: 0,
-            rotation_mrad: 0,
             ways: Openings::NONE,
             exits: Exits::new(0),
             returns: 0,
             search_frames: 0,
-            gap: Vector { x: 0, y: 0 },
-            gap_mm: 0,
-            radius_mm: 0,
-            is_homing: false,
-            forward_permille: 0,
+            way_back: WayBack::new(),
             departure: Departure::UNKNOWN,
             is_returning: false,
             body: Body::new(),
@@ -267,60 +240,36 @@ impl LocalPlanner {
         self.enter(DriveState::FollowEdge);
     }
 
-    /// Processes the newest frame of the detector; `choose` returns the bearing of the exit to take, `None` to stop.
+    /// Processes the newest frame; `choose` returns the bearing of the exit to take, `None` to stop.
     pub(super) fn advance<const SONARS: usize>(
         &mut self,
-        detector: &PlaceDetector<SONARS>,
+        frame: &Frame<'_, SONARS>,
         choose: impl FnOnce(&Exits) -> Option<u16>,
     ) -> VelocityCommand {
         self.frames = self.frames.saturating_add(1);
-        self.rotation_mrad = detector.rotation_mrad();
-        let (scan, obstacles, is_at_place) = (&detector.scan(), detector.obstacles(), detector.is_at_place());
-        self.track_gap(scan);
-        self.body.look(scan, nearest_ahead(scan), self.config.body_radius_mm);
-        let is_held = self.body.is_held(scan, self.speed_permille, self.config.body_radius_mm);
+        self.way_back.track(frame);
+        if self.state == DriveState::FollowEdge {
+            self.way_back.follow_edge(frame, self.is_returning);
+        }
+        self.body.look(&frame.scan, frame.ahead, self.config.body_radius_mm);
+        let is_held = self.body.is_held(&frame.scan, self.speed_permille, self.config.body_radius_mm);
         let velocity = match self.state {
-            _ if is_held => self.give_up(scan),
+            _ if is_held => self.give_up(frame),
             DriveState::FollowEdge | DriveState::Approach | DriveState::Depart if self.body.is_blocked() => {
-                self.turn_back(scan)
+                self.turn_back(frame)
             }
-            DriveState::FollowEdge => self.follow_edge(scan, &obstacles, is_at_place),
-            DriveState::Approach => self.approach(scan, &obstacles),
-            DriveState::ChooseExit => self.choose_exit(scan, &obstacles, choose),
-            DriveState::TurnToExit => self.turn_to_exit(scan, &obstacles),
-            DriveState::Depart => self.depart(scan, &obstacles, is_at_place),
-            DriveState::Recover => self.recover(scan),
+            DriveState::FollowEdge => self.follow_edge(frame, frame.is_at_place),
+            DriveState::Approach => self.approach(frame),
+            DriveState::ChooseExit => self.choose_exit(frame, choose),
+            DriveState::TurnToExit => self.turn_to_exit(frame),
+            DriveState::Depart => self.depart(frame, frame.is_at_place),
+            DriveState::Recover => self.recover(frame),
             DriveState::Stopped => VelocityCommand::STOP,
         };
-        let aside_mrad = velocity.heading_mrad.unsigned_abs();
-        // The faster wheel is at most at full speed, so an arc is slower.
-        let on_arc_permille = 1000u16.saturating_sub(aside_mrad / 5 * 4);
-        self.forward_permille =
-            if aside_mrad > IN_PLACE_MRAD { 0 } else { velocity.speed_permille.min(on_arc_permille) };
+        self.way_back.drive(velocity);
         self.departure.driven_permille = self.departure.driven_permille.saturating_add(velocity.speed_permille.into());
         self.speed_permille = velocity.speed_permille;
         velocity
-    }
-
-    /// Follows the narrowest point of the edge that the robot has driven since the last place.
-    fn track_gap<const SONARS: usize>(&mut self, scan: &RingScan<'_, SONARS>) {
-        self.gap.x = self.gap.x.saturating_sub(self.forward_permille.into());
-        self.gap = self.gap.rotated(self.rotation_mrad);
-        if self.state != DriveState::FollowEdge {
-            return;
-        }
-        // Nearer than the gap's own sides there is another wall: the robot is not where it is estimated to be.
-        self.is_homing = self.is_homing
-            && scan
-                .nearest_between(-AHEAD_MRAD, AHEAD_MRAD)
-                .is_none_or(|nearest| u32::from(nearest.range_mm) * 3 >= u32::from(self.gap_mm) * 2);
-        let Some(beside_mm) = beside_mm(scan, Sector::BESIDE) else { return };
-        let is_open = nearest_ahead(scan).is_none_or(|ahead| ahead.range_mm > beside_mm.saturating_add(beside_mm / 2));
-        if beside_mm <= self.gap_mm && is_open && !self.is_returning {
-            (self.gap, self.gap_mm) = (Vector { x: 0, y: 0 }, beside_mm);
-        }
-        let is_there = u32::from(beside_mm) * 4 <= u32::from(self.gap_mm) * 5 || self.gap.x < -2 * HOME_PERMILLE;
-        self.is_homing &= !is_there;
     }
 
     fn enter(&mut self, state: DriveState) {
@@ -336,48 +285,43 @@ impl LocalPlanner {
         self.frames > self.config.timeout_frames
     }
 
-    fn follow_edge<const SONARS: usize>(
-        &mut self,
-        scan: &RingScan<'_, SONARS>,
-        obstacles: &Obstacles,
-        is_at_place: bool,
-    ) -> VelocityCommand {
+    fn follow_edge<const SONARS: usize>(&mut self, frame: &Frame<'_, SONARS>, is_at_place: bool) -> VelocityCommand {
         let is_refused = self.hall.is_followed() && self.frames < SEARCH_FRAMES;
         if !is_refused
             && !is_at_place
-            && obstacles.spread_mm().is_some_and(|spread_mm| spread_mm <= scan.equidistance_mm())
+            && frame.obstacles.spread_mm().is_some_and(|spread_mm| spread_mm <= frame.scan.equidistance_mm())
         {
             // The rotation of this frame is applied to it as to that of any other.
-            self.entry_mrad = rotated(HALF_TURN_MRAD, -self.rotation_mrad);
+            self.entry_mrad = rotated(HALF_TURN_MRAD, -frame.rotation_mrad);
             self.enter(DriveState::Approach);
-            return self.approach(scan, obstacles);
+            return self.approach(frame);
         }
         // A robot that a wall holds measures the same ranges as one on a very long edge.
         if self.frames > self.config.timeout_frames.saturating_mul(EDGE_TIMEOUTS) {
-            return self.give_up(scan);
+            return self.give_up(frame);
         }
-        if self.is_homing {
-            return self.drive_home(scan, obstacles.spread_mm());
+        if self.way_back.is_taken() {
+            return self.drive_back(frame, frame.obstacles.spread_mm());
         }
-        if let Some(heading_mrad) = self.hall.heading_mrad(scan) {
+        if let Some(heading_mrad) = self.hall.heading_mrad(&frame.scan) {
             return VelocityCommand { heading_mrad, speed_permille: self.config.speed_permille };
         }
-        self.drive(scan, Sector::EDGE, obstacles.spread_mm(), None)
+        self.drive(frame, Sector::EDGE, frame.obstacles.spread_mm(), None)
     }
 
-    fn approach<const SONARS: usize>(&mut self, scan: &RingScan<'_, SONARS>, obstacles: &Obstacles) -> VelocityCommand {
+    fn approach<const SONARS: usize>(&mut self, frame: &Frame<'_, SONARS>) -> VelocityCommand {
         if self.is_timed_out() {
-            return self.give_up(scan);
+            return self.give_up(frame);
         }
-        let limit_mm = scan.equidistance_mm().saturating_mul(2);
+        let limit_mm = frame.scan.equidistance_mm().saturating_mul(2);
         // In the corner of a hall an echo at a flat angle may look like a third wall. The detector does not confirm it.
         let is_refused = self.hall.is_followed() && self.frames > SEARCH_FRAMES;
-        if is_refused || obstacles.spread_mm().is_some_and(|spread_mm| spread_mm > limit_mm) {
+        if is_refused || frame.obstacles.spread_mm().is_some_and(|spread_mm| spread_mm > limit_mm) {
             self.enter(DriveState::FollowEdge);
-            return self.follow_edge(scan, obstacles, false);
+            return self.follow_edge(frame, false);
         }
-        self.track_entry(&scan.openings(obstacles));
-        match meet_point_offset_mm(obstacles) {
+        self.track_entry(&frame.scan.openings(&frame.obstacles), frame.rotation_mrad);
+        match meet_point_offset_mm(&frame.obstacles) {
             Some(offset) if offset.length() > i32::from(self.config.arrival_tolerance_mm) => {
                 let heading_mrad = offset.bearing_mrad();
                 // A meet point behind has been passed, and a turn towards it would lose the bearing of the entry.
@@ -392,25 +336,24 @@ impl LocalPlanner {
                 VelocityCommand { heading_mrad: FACING_MRAD as i16, speed_permille: 0 }
             }
             // A sensor looks through a door: it would not, turned by a few degrees.
-            _ if obstacles.is_at_door() => VelocityCommand::STOP,
+            _ if frame.obstacles.is_at_door() => VelocityCommand::STOP,
             _ => VelocityCommand { heading_mrad: Self::look_round_mrad(self.frames), speed_permille: 0 },
         }
     }
 
     fn choose_exit<const SONARS: usize>(
         &mut self,
-        scan: &RingScan<'_, SONARS>,
-        obstacles: &Obstacles,
+        frame: &Frame<'_, SONARS>,
         choose: impl FnOnce(&Exits) -> Option<u16>,
     ) -> VelocityCommand {
         if self.returns > MAX_RETURNS {
-            return self.give_up(scan);
+            return self.give_up(frame);
         }
         if self.exits.as_slice().is_empty() {
-            let openings = if self.ways.count() > 0 { self.ways } else { scan.openings(obstacles) };
-            self.track_entry(&openings);
+            let openings = if self.ways.count() > 0 { self.ways } else { frame.scan.openings(&frame.obstacles) };
+            self.track_entry(&openings, frame.rotation_mrad);
             if openings.count() == 0 {
-                return if self.frames > CHOOSE_FRAMES { self.give_up(scan) } else { VelocityCommand::STOP };
+                return if self.frames > CHOOSE_FRAMES { self.give_up(frame) } else { VelocityCommand::STOP };
             }
             for &opening_mrad in openings.bearings_mrad() {
                 let relative_mrad = counter_clockwise_mrad(self.entry_mrad, opening_mrad).min(MAX_RELATIVE_MRAD);
@@ -425,41 +368,32 @@ impl LocalPlanner {
         self.target_mrad = rotated(self.entry_mrad, exit_mrad.into());
         // The edge by which the robot came may end at a door that no sonar looks through from here.
         let is_back = turn_mrad(self.entry_mrad, self.target_mrad).abs() < BACK_MRAD;
-        self.radius_mm = obstacles.radius_mm();
-        let is_door = self.gap_mm > 0 && u32::from(self.gap_mm) * 3 < u32::from(self.radius_mm) * 2;
-        let gap_mrad = self.gap.bearing_mrad();
-        let wall = scan.nearest(|bearing_mrad| turn_mrad(gap_mrad, bearing_mrad).abs() < HIDDEN_MRAD);
-        let is_hidden = wall.is_some_and(|wall| u32::from(wall.range_mm) * 5 < u32::from(self.radius_mm) * 8);
-        self.is_homing = is_back && is_door && is_hidden && self.gap.length() > HOME_PERMILLE;
-        if self.is_homing {
-            self.target_mrad = self.gap.bearing_mrad();
+        self.way_back.choose(frame, is_back);
+        if self.way_back.is_taken() {
+            self.target_mrad = self.way_back.bearing_mrad();
         }
         self.search_frames = 0;
         self.enter(DriveState::TurnToExit);
-        self.turn_to_exit(scan, obstacles)
+        self.turn_to_exit(frame)
     }
 
-    fn turn_to_exit<const SONARS: usize>(
-        &mut self,
-        scan: &RingScan<'_, SONARS>,
-        obstacles: &Obstacles,
-    ) -> VelocityCommand {
+    fn turn_to_exit<const SONARS: usize>(&mut self, frame: &Frame<'_, SONARS>) -> VelocityCommand {
         if self.is_timed_out() {
-            return self.give_up(scan);
+            return self.give_up(frame);
         }
-        if self.is_homing {
-            self.target_mrad = self.gap.bearing_mrad();
+        if self.way_back.is_taken() {
+            self.target_mrad = self.way_back.bearing_mrad();
             if i32::from(self.target_mrad).abs() <= FACING_MRAD {
                 self.enter(DriveState::Depart);
-                return self.depart(scan, obstacles, true);
+                return self.depart(frame, true);
             }
             return VelocityCommand { heading_mrad: self.target_mrad, speed_permille: 0 };
         }
         // An exit that this frame does not show is where the rotation of the ring brings it. While the robot turns, the ring misses
         // openings and merges them: a frame that shows another number of them is trusted less.
-        let expected_mrad = rotated(self.target_mrad, self.rotation_mrad);
-        let openings = scan.openings(obstacles);
-        self.track_entry(&openings);
+        let expected_mrad = rotated(self.target_mrad, frame.rotation_mrad);
+        let openings = frame.scan.openings(&frame.obstacles);
+        self.track_entry(&openings, frame.rotation_mrad);
         let count = self.exits.as_slice().len();
         // A dead end has no other opening.
         let within_mrad = match usize::from(openings.count()) {
@@ -475,10 +409,9 @@ impl LocalPlanner {
         if !(is_behind && is_reversed) {
             self.target_mrad = target_mrad;
         }
-        let facing_mrad = facing_mrad(scan);
-        if i32::from(self.target_mrad).abs() <= facing_mrad {
+        if i32::from(self.target_mrad).abs() <= frame.facing_mrad {
             // With the sensors ahead dead the exit is not seen, and the estimate replaces it.
-            let is_certain = seen.is_some() || facing_mrad > FACING_MRAD;
+            let is_certain = seen.is_some() || frame.is_blind_ahead();
             if is_certain {
                 // The way by which the robot came and the exit are tracked separately. When they do not agree, one of them is another opening.
                 let exit_mrad = counter_clockwise_mrad(self.entry_mrad, self.target_mrad);
@@ -489,7 +422,7 @@ impl LocalPlanner {
             }
             if is_certain || self.search_frames > SEARCH_FRAMES {
                 self.enter(DriveState::Depart);
-                return self.depart(scan, obstacles, true);
+                return self.depart(frame, true);
             }
             self.search_frames += 1;
             return VelocityCommand { heading_mrad: Self::look_round_mrad(self.search_frames), speed_permille: 0 };
@@ -497,39 +430,33 @@ impl LocalPlanner {
         VelocityCommand { heading_mrad: self.target_mrad.clamp(-TURN_MRAD, TURN_MRAD), speed_permille: 0 }
     }
 
-    fn depart<const SONARS: usize>(
-        &mut self,
-        scan: &RingScan<'_, SONARS>,
-        obstacles: &Obstacles,
-        is_at_place: bool,
-    ) -> VelocityCommand {
+    fn depart<const SONARS: usize>(&mut self, frame: &Frame<'_, SONARS>, is_at_place: bool) -> VelocityCommand {
         if self.is_timed_out() {
-            return self.give_up(scan);
+            return self.give_up(frame);
         }
         if !is_at_place {
             self.enter(DriveState::FollowEdge);
-            if !self.is_homing {
-                self.gap_mm = u16::MAX;
-            }
-            return self.follow_edge(scan, obstacles, is_at_place);
+            self.way_back.start_edge();
+            return self.follow_edge(frame, is_at_place);
         }
-        if self.is_homing {
-            return self.drive_home(scan, None);
+        if self.way_back.is_taken() {
+            return self.drive_back(frame, None);
         }
         // At a crossing, a sensor that should measure the obstacle beside the exit may measure the next one.
-        let expected_mrad = rotated(self.target_mrad, if self.frames > 0 { self.rotation_mrad } else { 0 });
-        let seen = scan.openings(obstacles).nearest(expected_mrad, EXIT_MRAD);
+        let expected_mrad = rotated(self.target_mrad, if self.frames > 0 { frame.rotation_mrad } else { 0 });
+        let seen = frame.scan.openings(&frame.obstacles).nearest(expected_mrad, EXIT_MRAD);
         self.target_mrad = seen.map_or(expected_mrad, |(_, target_mrad)| target_mrad);
-        let is_wide = seen.is_some() && scan.narrow_openings(obstacles).nearest(expected_mrad, EXIT_MRAD).is_none();
+        let is_wide =
+            seen.is_some() && frame.scan.narrow_openings(&frame.obstacles).nearest(expected_mrad, EXIT_MRAD).is_none();
         let sector = if is_wide { Sector::EXIT } else { Sector::DOOR };
-        self.drive(scan, sector, None, Some(self.target_mrad))
+        self.drive(frame, sector, None, Some(self.target_mrad))
     }
 
-    fn recover<const SONARS: usize>(&mut self, scan: &RingScan<'_, SONARS>) -> VelocityCommand {
-        self.target_mrad = rotated(self.target_mrad, self.rotation_mrad);
+    fn recover<const SONARS: usize>(&mut self, frame: &Frame<'_, SONARS>) -> VelocityCommand {
+        self.target_mrad = rotated(self.target_mrad, frame.rotation_mrad);
         let limit_mm = self.config.clearance_mm.saturating_mul(2);
-        let is_free = nearest_ahead(scan).is_none_or(|ahead| ahead.range_mm > limit_mm);
-        let faces = i32::from(self.target_mrad).abs() <= facing_mrad(scan);
+        let is_free = frame.ahead.is_none_or(|ahead| ahead.range_mm > limit_mm);
+        let faces = i32::from(self.target_mrad).abs() <= frame.facing_mrad;
         if is_free && faces && self.body.is_free() || self.is_timed_out() {
             self.enter(DriveState::FollowEdge);
         }
@@ -537,70 +464,68 @@ impl LocalPlanner {
     }
 
     /// Records that the robot is lost, and turns to the direction with the most room.
-    fn give_up<const SONARS: usize>(&mut self, scan: &RingScan<'_, SONARS>) -> VelocityCommand {
+    fn give_up<const SONARS: usize>(&mut self, frame: &Frame<'_, SONARS>) -> VelocityCommand {
         self.faults.record(FaultKind::DriveLost);
         self.departure = Departure::UNKNOWN;
-        (self.is_homing, self.gap_mm) = (false, 0);
+        self.way_back.forget();
         self.is_returning = false;
         let room_mm = self.config.clearance_mm.saturating_mul(2);
-        self.target_mrad = widest_room_mrad(scan, room_mm).unwrap_or(HALF_TURN_MRAD);
+        self.target_mrad = widest_room_mrad(&frame.scan, room_mm).unwrap_or(HALF_TURN_MRAD);
         self.enter(DriveState::Recover);
         VelocityCommand { heading_mrad: self.target_mrad.clamp(-TURN_MRAD, TURN_MRAD), speed_permille: 0 }
     }
 
     /// Turns round, because the way ahead is no way for the body. The robot returns to the place before.
-    fn turn_back<const SONARS: usize>(&mut self, scan: &RingScan<'_, SONARS>) -> VelocityCommand {
+    fn turn_back<const SONARS: usize>(&mut self, frame: &Frame<'_, SONARS>) -> VelocityCommand {
         if !self.departure.is_known || self.is_returning {
-            return self.give_up(scan);
+            return self.give_up(frame);
         }
         self.is_returning = true;
-        self.is_homing = false;
+        self.way_back.cancel();
         self.target_mrad = HALF_TURN_MRAD;
         self.enter(DriveState::Recover);
         VelocityCommand { heading_mrad: self.target_mrad.clamp(-TURN_MRAD, TURN_MRAD), speed_permille: 0 }
     }
 
-    /// Drives to the gap by which the robot came, between the obstacles beside it once they are nearer than those of the place.
-    fn drive_home<const SONARS: usize>(
+    /// Drives back to the gap by which the robot came.
+    fn drive_back<const SONARS: usize>(
         &mut self,
-        scan: &RingScan<'_, SONARS>,
+        frame: &Frame<'_, SONARS>,
         spread_mm: Option<u16>,
     ) -> VelocityCommand {
-        // Near the estimated point its bearing is as uncertain as the point.
-        let home_mrad = if self.gap.length() < HOME_PERMILLE { 0 } else { self.gap.bearing_mrad() };
-        let is_near = |range_mm: u16| u32::from(range_mm) * 4 < u32::from(self.radius_mm) * 3;
-        let gap_mrad =
-            gap_ahead_mrad(scan, home_mrad).filter(|&(_, range_mm)| is_near(range_mm)).map(|(gap_mrad, _)| gap_mrad);
-        let sector = if beside_mm(scan, Sector::DOOR).is_some_and(is_near) { Sector::DOOR } else { Sector::NONE };
-        self.drive(scan, sector, spread_mm, Some(gap_mrad.unwrap_or(home_mrad)))
+        let (sector, bearing_mrad) = self.way_back.course(frame);
+        self.drive(frame, sector, spread_mm, Some(bearing_mrad))
     }
 
     /// Drives along the edge between the obstacles in a sector, more slowly with a smaller spread. The heading is that of the exit
     /// within [`ASIDE_MRAD`].
     fn drive<const SONARS: usize>(
         &mut self,
-        scan: &RingScan<'_, SONARS>,
+        frame: &Frame<'_, SONARS>,
         sector: Sector,
         spread_mm: Option<u16>,
         exit_mrad: Option<i16>,
     ) -> VelocityCommand {
-        if nearest_ahead(scan).is_some_and(|ahead| ahead.range_mm < self.config.clearance_mm) {
-            return self.turn_back(scan);
+        if frame.ahead.is_some_and(|ahead| ahead.range_mm < self.config.clearance_mm) {
+            return self.turn_back(frame);
         }
-        let mut heading_mrad = edge_heading_mrad(scan, sector, self.config.look_ahead_mm).or(exit_mrad).unwrap_or(0);
+        let mut heading_mrad =
+            edge_heading_mrad(&frame.scan, sector, self.config.look_ahead_mm).or(exit_mrad).unwrap_or(0);
         if let Some(exit_mrad) = exit_mrad {
             let (least_mrad, most_mrad) = (exit_mrad.saturating_sub(ASIDE_MRAD), exit_mrad.saturating_add(ASIDE_MRAD));
             heading_mrad = heading_mrad.max(least_mrad).min(most_mrad);
         }
-        let heading_mrad = heading_mrad.clamp(-MAX_HEADING_MRAD, MAX_HEADING_MRAD).saturating_add(self.sway_mrad(scan));
+        let heading_mrad =
+            heading_mrad.clamp(-MAX_HEADING_MRAD, MAX_HEADING_MRAD).saturating_add(self.sway_mrad(frame));
         let speed_permille = self.speed_permille_at(spread_mm.unwrap_or(u16::MAX));
-        VelocityCommand { heading_mrad, speed_permille: speed_permille.min(self.speed_beside_permille(scan)) }
+        VelocityCommand { heading_mrad, speed_permille: speed_permille.min(self.speed_beside_permille(frame)) }
     }
 
     /// The speed that the room on both sides allows: it falls as a wall comes nearer than twice the body.
-    fn speed_beside_permille<const SONARS: usize>(&self, scan: &RingScan<'_, SONARS>) -> u16 {
+    fn speed_beside_permille<const SONARS: usize>(&self, frame: &Frame<'_, SONARS>) -> u16 {
         let body_mm = self.config.body_radius_mm;
-        let nearest_mm = scan.nearest_between(-AHEAD_MRAD, AHEAD_MRAD).map_or(u16::MAX, |nearest| nearest.range_mm);
+        let nearest_mm =
+            frame.scan.nearest_between(-AHEAD_MRAD, AHEAD_MRAD).map_or(u16::MAX, |nearest| nearest.range_mm);
         let room_mm = nearest_mm.saturating_sub(body_mm).min(body_mm);
         let share = u32::from(self.config.speed_permille) * u32::from(room_mm);
         let share = share.checked_div(body_mm.into()).map_or(u16::MAX, |share| share as u16);
@@ -613,8 +538,8 @@ impl LocalPlanner {
     }
 
     /// With the sensors ahead dead, a swaying robot measures the range ahead with those beside them.
-    fn sway_mrad<const SONARS: usize>(&self, scan: &RingScan<'_, SONARS>) -> i16 {
-        match (facing_mrad(scan) > FACING_MRAD, self.frames & SWAY_FRAMES == 0) {
+    fn sway_mrad<const SONARS: usize>(&self, frame: &Frame<'_, SONARS>) -> i16 {
+        match (frame.is_blind_ahead(), self.frames & SWAY_FRAMES == 0) {
             (false, _) => 0,
             (true, true) => SWAY_MRAD,
             (true, false) => -SWAY_MRAD,
@@ -629,24 +554,9 @@ impl LocalPlanner {
     }
 
     /// Updates the bearing of the entry. In a frame that does not show the entry it is where the rotation of the ring brings it.
-    fn track_entry(&mut self, openings: &Openings) {
-        let expected_mrad = rotated(self.entry_mrad, self.rotation_mrad);
+    fn track_entry(&mut self, openings: &Openings, rotation_mrad: i32) {
+        let expected_mrad = rotated(self.entry_mrad, rotation_mrad);
         let seen = openings.nearest(expected_mrad, SAME_OPENING_MRAD);
         self.entry_mrad = seen.map_or(expected_mrad, |(_, entry_mrad)| entry_mrad);
     }
-}
-
-/// Half-width of the sector whose sensors measure the range ahead: wider where all of those straight ahead are dead.
-#[inline(never)]
-fn facing_mrad<const SONARS: usize>(scan: &RingScan<'_, SONARS>) -> i32 {
-    let faces = |bearing_mrad: i16| i32::from(bearing_mrad).abs() < FACING_MRAD;
-    let is_live = scan.echoes().any(|(echo, bearing_mrad)| echo != Echo::Dead && faces(bearing_mrad));
-    if is_live { FACING_MRAD } else { FACING_BESIDE_DEAD_MRAD }
-}
-
-/// The nearest obstacle ahead.
-#[inline(never)]
-fn nearest_ahead<const SONARS: usize>(scan: &RingScan<'_, SONARS>) -> Option<Obstacle> {
-    let within_mrad = facing_mrad(scan) as i16;
-    scan.nearest_between(1 - within_mrad, within_mrad - 1)
 }

@@ -10,6 +10,8 @@
 //! |---|---|
 //! | Heading along an edge, position of a meet point | `voronoi.rs` |
 //! | Gaps that the body does not fit through, walls that hold it | `body.rs` |
+//! | The newest frame, and the range ahead | `frame.rs` |
+//! | The way back through a door that no sonar looks through | `way_back.rs` |
 //! | Walls of halls wider than the sonars reach | `hall.rs` |
 //! | State machine from place to place ([`DriveState`]) | `local_planner.rs` |
 //! | Choice of an exit: explore, or drive to a vertex ([`Goal`]) | `route_planner.rs` |
@@ -24,6 +26,7 @@
 
 mod body;
 mod config;
+mod frame;
 mod hall;
 mod local_planner;
 mod route_planner;
@@ -31,6 +34,7 @@ mod routes;
 #[cfg(test)]
 mod test_ring;
 mod voronoi;
+mod way_back;
 mod wheels;
 
 pub use config::DriveConfig;
@@ -43,6 +47,7 @@ use crate::fault::FaultCounters;
 use crate::filter::{Filter, Passage};
 use crate::map::VertexId;
 use crate::place::{Place, PlaceDetector};
+use frame::Frame;
 use local_planner::LocalPlanner;
 use route_planner::RoutePlanner;
 
@@ -113,7 +118,7 @@ impl<const V: usize> Drive<V> {
             return VelocityCommand::STOP;
         }
         let route_planner = &mut self.route_planner;
-        self.local_planner.advance(detector, |exits| route_planner.choose(filter, exits))
+        self.local_planner.advance(&Frame::of(detector), |exits| route_planner.choose(filter, exits))
     }
 
     /// How the robot drives from the place that was reported last: the hints of the next observation.

@@ -5,11 +5,13 @@
 //! −(u − v) · δ. The edge is therefore perpendicular to u − v, and a meet point is the δ that makes both differences 0.
 
 use crate::bearing::{UNIT, Vector, rotated, turn_mrad, unit};
-use crate::place::{Obstacle, Obstacles, RingScan};
+use crate::place::{Obstacle, Obstacles, RingScan, is_open};
 use crate::ring::Echo;
 
-/// Ahead is within this angle of straight ahead, in milliradians.
-const AHEAD_MRAD: i16 = 1047;
+/// Obstacles at a larger angle from straight ahead have been passed, in milliradians: 100°.
+pub(super) const AHEAD_MRAD: i16 = 1745;
+/// The wall with a gap is searched within this angle of straight ahead, in milliradians.
+const WALL_AHEAD_MRAD: i16 = 1047;
 /// A wall is measured this far off its normal, in milliradians: silence nearer to the normal is a gap.
 const GAP_MRAD: i32 = 720;
 
@@ -31,6 +33,18 @@ impl Sector {
     pub(super) const NONE: Self = Self { from_mrad: 1, to_mrad: 0 };
     /// 45° to 135°: the two obstacles between which the robot is.
     pub(super) const BESIDE: Self = Self { from_mrad: 785, to_mrad: 2356 };
+    /// 20° to 100°: the two obstacles of a gap ahead.
+    pub(super) const AHEAD: Self = Self { from_mrad: 350, to_mrad: AHEAD_MRAD };
+
+    /// The nearest obstacles on the left and on the right.
+    pub(super) fn sides<const SONARS: usize>(
+        self,
+        scan: &RingScan<'_, SONARS>,
+    ) -> (Option<Obstacle>, Option<Obstacle>) {
+        let left = scan.nearest_between(self.from_mrad, self.to_mrad);
+        let right = scan.nearest_between(-self.to_mrad, -self.from_mrad);
+        (left, right)
+    }
 }
 
 /// Heading to the point of the edge that is `look_ahead_mm` ahead, between the closest obstacles on the left and on the
@@ -40,9 +54,7 @@ pub(super) fn edge_heading_mrad<const SONARS: usize>(
     sector: Sector,
     look_ahead_mm: u16,
 ) -> Option<i16> {
-    let left = scan.nearest_between(sector.from_mrad, sector.to_mrad);
-    let right = scan.nearest_between(-sector.to_mrad, -sector.from_mrad);
-    match (left, right) {
+    match sector.sides(scan) {
         (None, _) | (_, None) if sector == Sector::DOOR => None,
         (Some(left), Some(right)) => Some(heading_between_mrad(left, right, look_ahead_mm)),
         (Some(left), None) => Some(left.bearing_mrad.saturating_sub(1571)),
@@ -53,8 +65,7 @@ pub(super) fn edge_heading_mrad<const SONARS: usize>(
 
 /// Mean range of the nearest obstacles on the left and on the right; `None` without an obstacle on one side.
 pub(super) fn beside_mm<const SONARS: usize>(scan: &RingScan<'_, SONARS>, sector: Sector) -> Option<u16> {
-    let left = scan.nearest_between(sector.from_mrad, sector.to_mrad)?;
-    let right = scan.nearest_between(-sector.to_mrad, -sector.from_mrad)?;
+    let (Some(left), Some(right)) = sector.sides(scan) else { return None };
     Some(left.range_mm / 2 + right.range_mm / 2)
 }
 
@@ -64,7 +75,7 @@ pub(super) fn gap_ahead_mrad<const SONARS: usize>(
     scan: &RingScan<'_, SONARS>,
     towards_mrad: i16,
 ) -> Option<(i16, u16)> {
-    let wall = scan.nearest_between(1 - AHEAD_MRAD, AHEAD_MRAD - 1)?;
+    let wall = scan.nearest_between(1 - WALL_AHEAD_MRAD, WALL_AHEAD_MRAD - 1)?;
     let is_left = turn_mrad(wall.bearing_mrad, towards_mrad) > 0;
     let (mut count, mut sum_mrad) = (0i32, 0i32);
     for (echo, bearing_mrad) in scan.echoes() {
@@ -72,7 +83,7 @@ pub(super) fn gap_ahead_mrad<const SONARS: usize>(
         let is_open = match echo {
             Echo::Dead => false,
             Echo::Silence => true,
-            Echo::Range { range_mm } => u32::from(range_mm) * 5 > u32::from(wall.range_mm) * 8,
+            Echo::Range { range_mm } => is_open(range_mm, wall.range_mm),
         };
         if is_open && (aside_mrad > 0) == is_left && aside_mrad.abs() < GAP_MRAD {
             (count, sum_mrad) = (count + 1, sum_mrad + aside_mrad);

@@ -55,6 +55,7 @@ pub use config::PlaceConfig;
 pub use detector::{Place, PlaceDetector};
 pub use fingerprint::{Fingerprint, FingerprintError};
 pub use openings::Openings;
+pub(crate) use openings::is_open;
 pub use scan::{Obstacle, Obstacles, RingScan};
 
 #[cfg(test)]

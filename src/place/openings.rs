@@ -182,7 +182,7 @@ impl OpenSensors {
 }
 
 /// Whether a range is too long for a corner between two equidistant walls.
-pub(super) fn is_open(range_mm: u16, radius_mm: u16) -> bool {
+pub(crate) fn is_open(range_mm: u16, radius_mm: u16) -> bool {
     is_beyond(OPEN_PERCENT, range_mm, radius_mm)
 }
 
