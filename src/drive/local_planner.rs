@@ -1,15 +1,17 @@
 //! Drives from one place to the next: along an edge, to the meet point, and out by the chosen exit.
 
 use super::body::{Body, widest_room_mrad};
+use super::departure::Departure;
 use super::frame::{FACING_MRAD, Frame};
 use super::hall::Hall;
-use super::voronoi::{AHEAD_MRAD, Sector, edge_heading_mrad, meet_point_offset_mm};
+use super::steering::{heading_mrad, look_round_mrad, speed_beside_permille, speed_permille_at, sway_mrad};
+use super::voronoi::{Sector, meet_point_offset_mm};
 use super::way_back::WayBack;
 use super::{DriveConfig, VelocityCommand};
 use crate::bearing::{HALF_TURN_MRAD, counter_clockwise_mrad, rotated, turn_mrad};
 use crate::config_error::ConfigError;
 use crate::fault::{FaultCounters, FaultKind};
-use crate::filter::{Exit, Passage};
+use crate::filter::Passage;
 use crate::place::{Obstacles, Openings};
 use crate::top_k::TopK;
 
@@ -22,20 +24,10 @@ const DOUBTFUL_OPENING_MRAD: u16 = 350;
 const TURN_MRAD: i16 = 300;
 /// An exit whose bearing relative to the way by which the robot came differs by more than this after the turn is unknown, in milliradians.
 const SAME_EXIT_MRAD: i32 = 500;
-/// On the way out an exit is searched within this angle of where it was, in milliradians,
+/// On the way out an exit is searched within this angle of where it was, in milliradians.
 const EXIT_MRAD: u16 = 500;
-/// and the robot does not steer off its bearing by more than this.
-const ASIDE_MRAD: i16 = 200;
-/// With the sensors ahead dead the robot sways by this angle to either side, in milliradians,
-const SWAY_MRAD: i16 = 260;
-/// for this number of frames each; a power of two.
-const SWAY_FRAMES: u16 = 8;
 /// At a place the planner waits at most this many frames for as many openings as the detector counted.
 const CHOOSE_FRAMES: u16 = 12;
-/// A robot that looks for a narrow gap turns towards this bearing on either side, in milliradians,
-const LOOK_ROUND_MRAD: i16 = 180;
-/// for this number of frames each; a power of two.
-const LOOK_ROUND_FRAMES: u16 = 8;
 /// After as many returns to a place the robot is lost: no exit leads on.
 const MAX_RETURNS: u8 = 4;
 /// Back is the exit within this angle of the way by which the robot came, in milliradians.
@@ -48,14 +40,6 @@ const SEARCH_FRAMES: u16 = 24;
 const DEPART_FRAMES: u16 = 8;
 /// An edge may take as many times the time of a manoeuvre.
 const EDGE_TIMEOUTS: u16 = 20;
-/// Limit of the heading along an edge, in milliradians: an edge is smooth, and an intermittent echo must not turn the robot
-/// round.
-const MAX_HEADING_MRAD: i16 = 500;
-/// Minimum speed near a meet point, in thousandths.
-const APPROACH_PERMILLE: u16 = 250;
-/// Distance from a meet point at which the speed begins to fall, in millimetres.
-const BRAKE_MM: u16 = 400;
-
 /// What the drive is doing.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u8)]
@@ -83,20 +67,6 @@ pub(super) type Exits = TopK<u16, { Obstacles::MAX }>;
 
 /// The largest bearing relative to another, in milliradians.
 const MAX_RELATIVE_MRAD: i32 = 6282;
-
-/// How the robot left the place that was reported last. It is all zero while unknown, so a `static` robot lies in `.bss`.
-#[derive(Clone, Copy, Debug)]
-struct Departure {
-    is_known: bool,
-    /// The bearing of the exit relative to the way by which the robot entered.
-    exit_mrad: u16,
-    /// The sum of the speeds of all frames since then, in thousandths of full speed.
-    driven_permille: u32,
-}
-
-impl Departure {
-    const UNKNOWN: Self = Self { is_known: false, exit_mrad: 0, driven_permille: 0 };
-}
 
 /// A state machine with one step for each ring frame. Memory: some 60 bytes.
 #[derive(Clone, Debug)]
@@ -177,16 +147,11 @@ impl LocalPlanner {
     /// What is known of the way from the place that was reported last.
     pub(super) fn passage(&self) -> Passage {
         let entry_mrad = (self.state == DriveState::Approach).then_some(self.entry_mrad);
-        let Departure { is_known, exit_mrad, driven_permille } = self.departure;
         if self.is_returning {
-            return Passage { returns: true, entry_mrad, ..Passage::UNKNOWN };
+            Passage { returns: true, entry_mrad, ..Passage::UNKNOWN }
+        } else {
+            self.departure.passage(entry_mrad)
         }
-        if !is_known {
-            return Passage { entry_mrad, ..Passage::UNKNOWN };
-        }
-        let frames = driven_permille.saturating_add(500) / 1000;
-        let travel_frames = Some(frames.clamp(1, u16::MAX.into()) as u16);
-        Passage { exit: Exit::from_bearing_mrad(exit_mrad).ok(), travel_frames, entry_mrad, returns: false }
     }
 
     /// Whether the robot is not on its way along the graph: it turns away from a wall, or stands in a gap that is too narrow for it.
@@ -267,7 +232,7 @@ impl LocalPlanner {
             DriveState::Stopped => VelocityCommand::STOP,
         };
         self.way_back.drive(velocity);
-        self.departure.driven_permille = self.departure.driven_permille.saturating_add(velocity.speed_permille.into());
+        self.departure.drive(velocity.speed_permille);
         self.speed_permille = velocity.speed_permille;
         velocity
     }
@@ -328,8 +293,8 @@ impl LocalPlanner {
                 if i32::from(heading_mrad).abs() > 1571 {
                     return VelocityCommand::STOP;
                 }
-                let distance_mm = offset.length().clamp(0, i32::from(BRAKE_MM)) as u16;
-                VelocityCommand { heading_mrad, speed_permille: self.speed_permille_at(distance_mm) }
+                let distance_mm = offset.length().clamp(0, u16::MAX.into()) as u16;
+                VelocityCommand { heading_mrad, speed_permille: speed_permille_at(&self.config, distance_mm) }
             }
             // The third obstacle may be in front of a dead sensor, or at a flat angle: turn until another one sees it.
             None if self.frames > CHOOSE_FRAMES => {
@@ -337,7 +302,7 @@ impl LocalPlanner {
             }
             // A sensor looks through a door: it would not, turned by a few degrees.
             _ if frame.obstacles.is_at_door() => VelocityCommand::STOP,
-            _ => VelocityCommand { heading_mrad: Self::look_round_mrad(self.frames), speed_permille: 0 },
+            _ => VelocityCommand { heading_mrad: look_round_mrad(self.frames), speed_permille: 0 },
         }
     }
 
@@ -364,7 +329,7 @@ impl LocalPlanner {
             self.enter(DriveState::Stopped);
             return VelocityCommand::STOP;
         };
-        self.departure = Departure { is_known: true, exit_mrad, driven_permille: 0 };
+        self.departure = Departure::by(exit_mrad);
         self.target_mrad = rotated(self.entry_mrad, exit_mrad.into());
         // The edge by which the robot came may end at a door that no sonar looks through from here.
         let is_back = turn_mrad(self.entry_mrad, self.target_mrad).abs() < BACK_MRAD;
@@ -425,7 +390,7 @@ impl LocalPlanner {
                 return self.depart(frame, true);
             }
             self.search_frames += 1;
-            return VelocityCommand { heading_mrad: Self::look_round_mrad(self.search_frames), speed_permille: 0 };
+            return VelocityCommand { heading_mrad: look_round_mrad(self.search_frames), speed_permille: 0 };
         }
         VelocityCommand { heading_mrad: self.target_mrad.clamp(-TURN_MRAD, TURN_MRAD), speed_permille: 0 }
     }
@@ -497,8 +462,7 @@ impl LocalPlanner {
         self.drive(frame, sector, spread_mm, Some(bearing_mrad))
     }
 
-    /// Drives along the edge between the obstacles in a sector, more slowly with a smaller spread. The heading is that of the exit
-    /// within [`ASIDE_MRAD`].
+    /// Drives along the edge between the obstacles in a sector, more slowly with a smaller spread, or out by an exit.
     fn drive<const SONARS: usize>(
         &mut self,
         frame: &Frame<'_, SONARS>,
@@ -509,48 +473,10 @@ impl LocalPlanner {
         if frame.ahead.is_some_and(|ahead| ahead.range_mm < self.config.clearance_mm) {
             return self.turn_back(frame);
         }
-        let mut heading_mrad =
-            edge_heading_mrad(&frame.scan, sector, self.config.look_ahead_mm).or(exit_mrad).unwrap_or(0);
-        if let Some(exit_mrad) = exit_mrad {
-            let (least_mrad, most_mrad) = (exit_mrad.saturating_sub(ASIDE_MRAD), exit_mrad.saturating_add(ASIDE_MRAD));
-            heading_mrad = heading_mrad.max(least_mrad).min(most_mrad);
-        }
         let heading_mrad =
-            heading_mrad.clamp(-MAX_HEADING_MRAD, MAX_HEADING_MRAD).saturating_add(self.sway_mrad(frame));
-        let speed_permille = self.speed_permille_at(spread_mm.unwrap_or(u16::MAX));
-        VelocityCommand { heading_mrad, speed_permille: speed_permille.min(self.speed_beside_permille(frame)) }
-    }
-
-    /// The speed that the room on both sides allows: it falls as a wall comes nearer than twice the body.
-    fn speed_beside_permille<const SONARS: usize>(&self, frame: &Frame<'_, SONARS>) -> u16 {
-        let body_mm = self.config.body_radius_mm;
-        let nearest_mm =
-            frame.scan.nearest_between(-AHEAD_MRAD, AHEAD_MRAD).map_or(u16::MAX, |nearest| nearest.range_mm);
-        let room_mm = nearest_mm.saturating_sub(body_mm).min(body_mm);
-        let share = u32::from(self.config.speed_permille) * u32::from(room_mm);
-        let share = share.checked_div(body_mm.into()).map_or(u16::MAX, |share| share as u16);
-        share.max(APPROACH_PERMILLE.min(self.config.speed_permille))
-    }
-
-    /// Turns to either side by half the angle between two sensors, so that one of them looks through a narrow gap.
-    const fn look_round_mrad(frames: u16) -> i16 {
-        if (frames + LOOK_ROUND_FRAMES / 2) & LOOK_ROUND_FRAMES == 0 { LOOK_ROUND_MRAD } else { -LOOK_ROUND_MRAD }
-    }
-
-    /// With the sensors ahead dead, a swaying robot measures the range ahead with those beside them.
-    fn sway_mrad<const SONARS: usize>(&self, frame: &Frame<'_, SONARS>) -> i16 {
-        match (frame.is_blind_ahead(), self.frames & SWAY_FRAMES == 0) {
-            (false, _) => 0,
-            (true, true) => SWAY_MRAD,
-            (true, false) => -SWAY_MRAD,
-        }
-    }
-
-    /// The speed at this distance from a meet point.
-    fn speed_permille_at(&self, distance_mm: u16) -> u16 {
-        let full = self.config.speed_permille;
-        let share = u32::from(distance_mm.min(BRAKE_MM)) * u32::from(full) / u32::from(BRAKE_MM);
-        (share as u16).max(APPROACH_PERMILLE.min(full))
+            heading_mrad(&self.config, frame, sector, exit_mrad).saturating_add(sway_mrad(frame, self.frames));
+        let speed_permille = speed_permille_at(&self.config, spread_mm.unwrap_or(u16::MAX));
+        VelocityCommand { heading_mrad, speed_permille: speed_permille.min(speed_beside_permille(&self.config, frame)) }
     }
 
     /// Updates the bearing of the entry. In a frame that does not show the entry it is where the rotation of the ring brings it.

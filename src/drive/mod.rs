@@ -13,6 +13,8 @@
 //! | The newest frame, and the range ahead | `frame.rs` |
 //! | The way back through a door that no sonar looks through | `way_back.rs` |
 //! | Walls of halls wider than the sonars reach | `hall.rs` |
+//! | Heading and speed along an edge | `steering.rs` |
+//! | The hints of the next observation | `departure.rs` |
 //! | State machine from place to place ([`DriveState`]) | `local_planner.rs` |
 //! | Choice of an exit: explore, or drive to a vertex ([`Goal`]) | `route_planner.rs` |
 //! | Travel times over the ways of the map | `routes.rs` |
@@ -26,11 +28,13 @@
 
 mod body;
 mod config;
+mod departure;
 mod frame;
 mod hall;
 mod local_planner;
 mod route_planner;
 mod routes;
+mod steering;
 #[cfg(test)]
 mod test_ring;
 mod voronoi;
