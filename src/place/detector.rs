@@ -1,10 +1,12 @@
 //! Confirms meet points over several frames, and reports each of them once.
 
+use super::came_by::CameBy;
 use super::implausible::Plausibility;
 use super::meet_point::MeetPoint;
-use super::openings::{MergedOpenings, Openings, is_open};
+use super::obstacles::Obstacles;
+use super::openings::{MergedOpenings, Openings};
 use super::rotation::RotationEstimate;
-use super::scan::{Obstacle, Obstacles, RingScan};
+use super::scan::RingScan;
 use super::smoothing::{DEAD_MM, RangeSmoother, SILENT_MM, bridge_dead_sensors};
 use super::{Fingerprint, PlaceConfig};
 use crate::bearing::{HALF_TURN_MRAD, rotated, turn_mrad};
@@ -20,14 +22,6 @@ const AVERAGED_SPREAD_MM: u16 = 30;
 const DOOR_SIGHTINGS: u8 = 3;
 /// A place that is one only because a sensor looks through a door needs this many sightings: silence may be a missed echo.
 const DOOR_CONFIRM_SIGHTINGS: u8 = 8;
-/// After this many frames between obstacles on both sides, with none behind, the way by which the robot came is known.
-const CAME_BY_FRAMES: u8 = 4;
-/// Along an edge the robot turns by at most this between two frames, in milliradians.
-const STRAIGHT_MRAD: i32 = 80;
-/// The obstacles beside an edge are within these angles of straight ahead, in milliradians.
-const BESIDE_MRAD: core::ops::RangeInclusive<i32> = 785..=2356;
-/// Sensors within this angle of straight behind measure the range behind, in milliradians.
-const BEHIND_MRAD: i32 = 350;
 
 /// A place that the robot has visited: a meet point of the Voronoi graph.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -104,10 +98,7 @@ pub struct PlaceDetector<const SONARS: usize> {
     door_sightings: u8,
     /// `turned_mrad` in the first of them.
     first_turned_mrad: i16,
-    /// The bearing of the way by which the robot came,
-    came_by_mrad: i16,
-    /// and the number of frames that showed it, up to [`CAME_BY_FRAMES`], when it is known.
-    came_by_frames: u8,
+    came_by: CameBy,
     /// The doors in the sightings, with bearings at the start.
     doors: MergedOpenings,
     /// Frames that contradict the present state minus frames that confirm it, at least 0.
@@ -137,8 +128,7 @@ impl<const SONARS: usize> PlaceDetector<SONARS> {
             sightings: 0,
             door_sightings: 0,
             first_turned_mrad: 0,
-            came_by_mrad: 0,
-            came_by_frames: 0,
+            came_by: CameBy::new(),
             doors: MergedOpenings::new(),
             contrary_frames: 0,
             best: [Sighting::UNSET; AVERAGED_FRAMES],
@@ -178,7 +168,7 @@ impl<const SONARS: usize> PlaceDetector<SONARS> {
         self.rotation = RotationEstimate::new();
         self.turned_mrad = 0;
         self.is_at_place = false;
-        self.came_by_frames = 0;
+        self.came_by.forget();
         self.faults = FaultCounters::new();
         self.forget_sightings();
         Ok(())
@@ -220,7 +210,10 @@ impl<const SONARS: usize> PlaceDetector<SONARS> {
         self.heard = heard;
         self.rotation.update(&self.smooth_mm, &self.geometry);
         self.turned_mrad = rotated(self.turned_mrad, self.rotation.rotation_mrad());
-        self.track_way(&heard);
+        let is_on_edge = !self.is_at_place && self.sightings == 0;
+        let mut came_by = self.came_by;
+        came_by.track(&self.scan(), &heard, self.rotation.rotation_mrad(), is_on_edge);
+        self.came_by = came_by;
         if self.is_at_place {
             self.wait_for_departure(heard.spread_mm().unwrap_or(u16::MAX));
             return None;
@@ -237,7 +230,7 @@ impl<const SONARS: usize> PlaceDetector<SONARS> {
             geometry: &self.geometry,
             separation_mrad: self.config.separation_mrad,
             equidistance_mm: self.config.equidistance_mm,
-            came_by_mrad: if self.came_by_frames >= CAME_BY_FRAMES { Some(self.came_by_mrad) } else { None },
+            came_by_mrad: self.came_by.bearing_mrad(),
         }
     }
 
@@ -273,7 +266,7 @@ impl<const SONARS: usize> PlaceDetector<SONARS> {
 
     /// Announces that the robot may be elsewhere: the way by which it came is unknown.
     pub const fn forget_way(&mut self) {
-        self.came_by_frames = 0;
+        self.came_by.forget();
     }
 
     /// Faults since the start: blind frames, ranges out of range, radii that no fingerprint represents.
@@ -299,34 +292,6 @@ impl<const SONARS: usize> PlaceDetector<SONARS> {
         ranges_mm
     }
 
-    /// Follows the way by which the robot came. Along an edge it is straight behind. From the first sighting of a meet point it is
-    /// the opening near the bearing to which the rotation of the ring brings it, because the errors of the rotation add up, or that
-    /// bearing where the sonars show no opening, as in front of a door.
-    fn track_way(&mut self, obstacles: &Obstacles) {
-        let came_by_mrad = rotated(self.came_by_mrad, self.rotation.rotation_mrad());
-        self.came_by_mrad = self.scan().heard_way(came_by_mrad, obstacles).unwrap_or(came_by_mrad);
-        if self.is_at_place || self.sightings > 0 {
-            return;
-        }
-        let mut nearest = obstacles.iter();
-        let (Some(one), Some(other)) = (nearest.next(), nearest.next()) else { return };
-        let is_beside = |obstacle: &Obstacle| BESIDE_MRAD.contains(&i32::from(obstacle.bearing_mrad).abs());
-        let is_between = is_beside(one) && is_beside(other) && (one.bearing_mrad < 0) != (other.bearing_mrad < 0);
-        let is_behind = |bearing_mrad: i16| turn_mrad(HALF_TURN_MRAD, bearing_mrad).abs() <= BEHIND_MRAD;
-        let is_open = || self.scan().nearest(is_behind).is_none_or(|behind| is_open(behind.range_mm, other.range_mm));
-        let is_edge = other.range_mm.saturating_sub(one.range_mm) <= self.config.equidistance_mm;
-        let is_straight = self.rotation.rotation_mrad().abs() <= STRAIGHT_MRAD;
-        let is_known = self.came_by_frames >= CAME_BY_FRAMES;
-        if is_between && is_edge && is_straight && (is_known || is_open()) {
-            if !is_known {
-                self.came_by_frames += 1;
-            }
-            self.came_by_mrad = HALF_TURN_MRAD;
-        } else if turn_mrad(HALF_TURN_MRAD, self.came_by_mrad).abs() > 1571 {
-            self.came_by_frames = 0;
-        }
-    }
-
     /// At a reported place: counts the frames that show a departure.
     fn wait_for_departure(&mut self, spread_mm: u16) {
         if spread_mm >= self.config.leave_mm {
@@ -336,8 +301,7 @@ impl<const SONARS: usize> PlaceDetector<SONARS> {
         }
         if self.contrary_frames >= self.config.leave_frames {
             self.is_at_place = false;
-            self.came_by_frames = CAME_BY_FRAMES;
-            self.came_by_mrad = HALF_TURN_MRAD;
+            self.came_by = CameBy::DEPARTED;
             self.forget_sightings();
         }
     }

@@ -1,7 +1,8 @@
 //! What one scan shows of a meet point: spread, radius and openings.
 
+use super::obstacles::Obstacles;
 use super::openings::Openings;
-use super::scan::{Obstacles, RingScan};
+use super::scan::RingScan;
 
 /// How well one scan shows a meet point.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -7,9 +7,10 @@
 //! | Step | File |
 //! |---|---|
 //! | Smooth the ranges of each sensor; fill in dead sensors | `smoothing.rs` |
-//! | Find the closest obstacles in separate bearings | `scan.rs` ([`RingScan`], [`Obstacles`]) |
+//! | Find the closest obstacles in separate bearings | `scan.rs` ([`RingScan`]), `obstacles.rs` ([`Obstacles`]) |
 //! | Find the openings between them | `openings.rs` ([`Openings`]) |
 //! | Estimate the rotation from frame to frame, and while the robot stands | `rotation.rs` |
+//! | Follow the way by which the robot came | `came_by.rs` |
 //! | Confirm a meet point over several frames and report it once | `detector.rs` ([`PlaceDetector`]) |
 //! | Quantise its radius (Eq. 1) | `fingerprint.rs` ([`Fingerprint`]) |
 //!
@@ -41,11 +42,13 @@
 //! # Ok::<(), toposlam::ConfigError>(())
 //! ```
 
+mod came_by;
 mod config;
 mod detector;
 mod fingerprint;
 mod implausible;
 mod meet_point;
+mod obstacles;
 mod openings;
 mod rotation;
 mod scan;
@@ -54,9 +57,10 @@ mod smoothing;
 pub use config::PlaceConfig;
 pub use detector::{Place, PlaceDetector};
 pub use fingerprint::{Fingerprint, FingerprintError};
+pub use obstacles::{Obstacle, Obstacles};
 pub use openings::Openings;
 pub(crate) use openings::is_open;
-pub use scan::{Obstacle, Obstacles, RingScan};
+pub use scan::RingScan;
 
 #[cfg(test)]
 mod tests;

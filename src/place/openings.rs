@@ -1,6 +1,7 @@
 //! The openings between equidistant obstacles: the directions in which edges leave a meet point.
 
-use super::scan::{Obstacles, RingScan};
+use super::obstacles::Obstacles;
+use super::scan::RingScan;
 use super::smoothing::DEAD_MM;
 use crate::bearing::{HALF_TURN_MRAD, counter_clockwise_mrad, rotated, turn_mrad};
 use crate::top_k::TopK;
