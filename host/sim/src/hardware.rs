@@ -8,7 +8,6 @@
 //! # Ok::<(), toposlam_sim::hardware::HardwareError>(())
 //! ```
 
-use std::f64::consts::TAU;
 use std::fmt;
 use std::ops::RangeInclusive;
 
@@ -17,7 +16,7 @@ use toposlam::drive::{DriveConfig, WheelsConfig};
 use toposlam::ring::RingGeometry;
 use toposlam::robot::RobotConfig;
 
-use crate::world::{BodyModel, RobotModel, SONARS_MAX, SonarModel};
+use crate::world::{BodyModel, RobotModel, SONARS_MAX, SonarModel, wrapped};
 
 /// A description that is no ring or no robot.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -140,8 +139,7 @@ impl Ring {
         let Some(bearings_rad) = self.sonar.bearings_rad else { return RingGeometry::even() };
         let milliradians = |sonar: usize| {
             let bearing_rad = bearings_rad.get(sonar).copied().unwrap_or(0.0);
-            let wrapped = (bearing_rad + TAU / 2.0).rem_euclid(TAU) - TAU / 2.0;
-            (1000.0 * wrapped).round() as i16
+            (1000.0 * wrapped(bearing_rad)).round() as i16
         };
         RingGeometry { bearings_mrad: std::array::from_fn(milliradians) }
     }

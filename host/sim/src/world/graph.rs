@@ -1,10 +1,9 @@
 //! Places and the ways between them, joined where a robot cannot distinguish them.
 
 use super::obstacles::Obstacles;
-use super::truth::narrowest_mm;
 use super::voronoi::Skeleton;
 use super::walls::Walls;
-use super::{Limits, Point, TrueEdge, TrueNode};
+use super::{Limits, Point, TrueEdge, TrueNode, length_mm};
 
 /// Two meet points of one place are at most this far apart, in millimetres.
 const PLACE_MM: f64 = 1000.0;
@@ -240,9 +239,9 @@ impl Graph {
     }
 }
 
-/// The length of a way, in millimetres.
-fn length_mm(way: &[Point]) -> f64 {
-    way.windows(2).map(|ends| ends[0].distance_mm(ends[1])).sum()
+/// The distance to walls at the narrowest point of a way, in millimetres.
+fn narrowest_mm(walls: &Walls, way: &[Point]) -> f64 {
+    way.iter().map(|point| walls.clearance_mm(*point)).fold(f64::INFINITY, f64::min)
 }
 
 /// Points along a way, close to each other, its ends included.

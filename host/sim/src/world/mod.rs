@@ -25,22 +25,26 @@ mod graph;
 mod grid;
 mod ground_truth;
 mod hints;
+mod limits;
 mod obstacles;
 mod plan;
 mod ray_casting;
 mod rover;
 mod simulation;
+mod true_map;
 mod truth;
 mod voronoi;
 mod walls;
 
 pub use ground_truth::{Detection, GroundTruth, Report};
 pub use hints::{HintReport, ReportedHints};
+pub use limits::Limits;
 pub use plan::{Plan, PlanError, PlanFileError};
+pub(crate) use ray_casting::wrapped;
 pub use ray_casting::{SONARS, SONARS_MAX, SonarModel};
 pub use rover::{BodyModel, Rover};
 pub use simulation::{Pose, RobotModel, Simulation, Truth};
-pub use truth::{Dropped, Limits, TrueEdge, TrueMap, TrueNode, TrueWay, UnreachablePart};
+pub use true_map::{Dropped, TrueEdge, TrueMap, TrueNode, TrueWay, UnreachablePart};
 pub use voronoi::VoronoiError;
 
 /// A point of the floor plan, in millimetres from its lower left corner; x to the right, y up.
@@ -72,4 +76,9 @@ impl Point {
     fn towards(self, other: Self, share: f64) -> Self {
         Self::new(self.x_mm + (other.x_mm - self.x_mm) * share, self.y_mm + (other.y_mm - self.y_mm) * share)
     }
+}
+
+/// The length of a polyline, in millimetres.
+pub fn length_mm(way: &[Point]) -> f64 {
+    way.windows(2).map(|ends| ends[0].distance_mm(ends[1])).sum()
 }

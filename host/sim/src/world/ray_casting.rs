@@ -89,7 +89,7 @@ impl SonarModel {
 }
 
 /// Wraps an angle to −π to π.
-pub(super) fn wrapped(angle_rad: f64) -> f64 {
+pub(crate) fn wrapped(angle_rad: f64) -> f64 {
     (angle_rad + PI).rem_euclid(TAU) - PI
 }
 

@@ -10,7 +10,7 @@ use toposlam::ring::RingFrame;
 use toposlam::{Exit, Passage};
 
 use super::ray_casting::{SONARS, Scene, SonarModel, wrapped};
-use super::{BodyModel, Limits, Plan, Point, TrueEdge, TrueMap, VoronoiError};
+use super::{BodyModel, Limits, Plan, Point, TrueEdge, TrueMap, VoronoiError, length_mm};
 
 /// Position and heading of the robot.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -232,7 +232,6 @@ impl Simulation {
 
     /// How the robot left the node before the nearer end of its edge.
     fn turn(&self) -> Option<Exit> {
-        let length_mm = |way: &[Point]| way.windows(2).map(|ends| ends[0].distance_mm(ends[1])).sum::<f64>();
         let driven_mm = length_mm(&self.way[..=self.leg]) + self.driven_mm;
         self.turns[usize::from(2.0 * driven_mm < length_mm(&self.way))]
     }

@@ -1,12 +1,12 @@
-//! The true map of a floor plan: what a robot of a given size with given sonars can distinguish (docs/plans.md has the definition).
+//! Computes the true map of a floor plan from its Voronoi diagram (docs/plans.md has the steps).
 
 use super::branches::prune;
 use super::graph::Graph;
+use super::limits::Limits;
 use super::obstacles::Obstacles;
+use super::true_map::{Dropped, TrueMap, UnreachablePart};
 use super::voronoi::{SAME_MM, Skeleton, VoronoiError};
-use super::walls::Walls;
-use super::{BodyModel, Plan, Point, SonarModel};
-use toposlam::place::PlaceConfig;
+use super::{Plan, Point};
 
 /// Obstacles whose true ranges differ by no more than this are as near, in millimetres: three standard deviations of a range.
 const AS_NEAR_MM: f64 = 45.0;
@@ -15,158 +15,6 @@ const AS_NEAR_SHARE: f64 = 0.1;
 
 /// Room that a robot needs beside its body, in millimetres: two standard deviations of a range.
 const PLAY_MM: f64 = 30.0;
-
-/// What a robot can drive through and distinguish.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Limits {
-    /// Half the robot's width, in millimetres.
-    pub body_radius_mm: f64,
-    /// Nothing farther is measured, in millimetres.
-    pub range_max_mm: f64,
-    /// Obstacles at least this far apart in bearing are two, in radians.
-    pub separation_rad: f64,
-    /// Obstacles closer by up to this are two where the range between them rises, in radians: half the cone of a sonar, because an
-    /// obstacle is measured up to that far aside.
-    pub cone_half_angle_rad: f64,
-    /// A place is left when the third obstacle is this much farther than the nearest, in millimetres.
-    pub leave_mm: f64,
-}
-
-impl Limits {
-    /// The limits of a robot that detects places by the default settings.
-    pub fn of(body: &BodyModel, sonar: &SonarModel) -> Self {
-        Self {
-            body_radius_mm: body.radius_mm,
-            range_max_mm: sonar.range_max_mm,
-            separation_rad: f64::from(PlaceConfig::DEFAULT.separation_mrad) / 1000.0,
-            cone_half_angle_rad: sonar.cone_half_angle_rad,
-            leave_mm: PlaceConfig::DEFAULT.leave_mm.into(),
-        }
-    }
-
-    /// What a branch must reach beyond the disc of its junction, and how far apart two places are, in millimetres.
-    pub(super) fn width_mm(&self) -> f64 {
-        2.0 * self.body_radius_mm
-    }
-}
-
-impl Default for Limits {
-    fn default() -> Self {
-        Self::of(&BodyModel::default(), &SonarModel::default())
-    }
-}
-
-/// A place of the true map.
-#[derive(Clone, Debug, PartialEq)]
-pub struct TrueNode {
-    /// Where it is.
-    pub position: Point,
-    /// Distance to the closest obstacles, in millimetres.
-    pub radius_mm: f64,
-    /// How many drivable edges end here.
-    pub degree: usize,
-    /// Every meet point that this place stands for, its own position included.
-    pub meet_points: Vec<Point>,
-    /// Whether the closest obstacles are beyond the range of the sonars.
-    pub is_hall: bool,
-}
-
-impl TrueNode {
-    /// The distance of a point to the nearest of its meet points, in millimetres.
-    pub fn distance_mm(&self, to: Point) -> f64 {
-        self.meet_points.iter().map(|point| point.distance_mm(to)).fold(f64::INFINITY, f64::min)
-    }
-}
-
-/// A drivable connection between two nodes.
-#[derive(Clone, Debug, PartialEq)]
-pub struct TrueEdge {
-    /// The nodes at its ends.
-    pub nodes: [usize; 2],
-    /// The way from the first node to the second.
-    pub way: Vec<Point>,
-    /// The largest distance of the way from the walls, in millimetres.
-    pub room_mm: f64,
-}
-
-/// One end of an edge at one of its nodes.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct TrueWay {
-    /// The edge.
-    pub edge: usize,
-    /// Whether the node is the second of the edge.
-    pub is_reversed: bool,
-    /// Direction of the point where the edge leaves the disc of the node, counter-clockwise from the x axis, in radians.
-    pub bearing_rad: f64,
-}
-
-impl TrueWay {
-    /// The edge and the end, for comparison.
-    pub const fn dart(&self) -> (usize, bool) {
-        (self.edge, self.is_reversed)
-    }
-}
-
-impl TrueEdge {
-    /// Length of the polyline, in millimetres.
-    pub fn length_mm(&self) -> f64 {
-        self.way.windows(2).map(|ends| ends[0].distance_mm(ends[1])).sum()
-    }
-
-    /// The point at this fraction of the polyline.
-    pub fn point_at(&self, share: f64) -> Point {
-        let mut left_mm = share * self.length_mm();
-        for ends in self.way.windows(2) {
-            let leg_mm = ends[0].distance_mm(ends[1]);
-            if left_mm <= leg_mm {
-                return ends[0].towards(ends[1], if leg_mm > 0.0 { left_mm / leg_mm } else { 0.0 });
-            }
-            left_mm -= leg_mm;
-        }
-        self.way.last().copied().unwrap_or_default()
-    }
-}
-
-/// Meet points of the Voronoi diagram that are no places of the true map, by the reason.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Dropped {
-    /// The body does not fit there.
-    pub narrow: usize,
-    /// They cannot be reached from the start.
-    pub unreachable: usize,
-    /// They lie on branches that do not lead on.
-    pub branches: usize,
-    /// No three obstacles are apart in bearing, and the way does not fork.
-    pub smooth: usize,
-    /// They are one place with another.
-    pub merged: usize,
-    /// The sonars do not reach the obstacles, and the way does not fork.
-    pub halls: usize,
-}
-
-/// A part of a plan that cannot be reached from the start.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct UnreachablePart {
-    /// Its most open meet point.
-    pub position: Point,
-    /// The distance to the closest obstacles there, in millimetres.
-    pub radius_mm: f64,
-    /// How many meet points it has.
-    pub meet_points: usize,
-}
-
-/// The true places of a floor plan and their connections, as far as they can be reached from the start.
-#[derive(Clone, Debug, PartialEq)]
-pub struct TrueMap {
-    /// The places.
-    pub nodes: Vec<TrueNode>,
-    /// The connections.
-    pub edges: Vec<TrueEdge>,
-    /// The meet points that are no places.
-    pub dropped: Dropped,
-    /// The parts where the body fits and that it cannot reach, the one with the most meet points first.
-    pub unreachable: Vec<UnreachablePart>,
-}
 
 impl TrueMap {
     /// The true map of a plan; [`Plan::true_map`] computes it once.
@@ -243,39 +91,6 @@ impl TrueMap {
         }
         Ok(Self { nodes, edges, dropped, unreachable })
     }
-
-    /// The ways of a node, counter-clockwise by their bearing from its position. A loop is two of them.
-    pub fn ways(&self, node: usize) -> Vec<TrueWay> {
-        let mut ways = Vec::new();
-        for (edge, true_edge) in self.edges.iter().enumerate() {
-            for is_reversed in [false, true] {
-                if true_edge.nodes[usize::from(is_reversed)] == node {
-                    ways.push(self.way(edge, is_reversed));
-                }
-            }
-        }
-        ways.sort_by(|one, other| one.bearing_rad.total_cmp(&other.bearing_rad));
-        ways
-    }
-
-    /// One end of an edge: the first node is that of the way, or the second if it is reversed.
-    pub fn way(&self, edge: usize, is_reversed: bool) -> TrueWay {
-        let TrueEdge { nodes, way, .. } = &self.edges[edge];
-        let node = &self.nodes[nodes[usize::from(is_reversed)]];
-        let mut points: Vec<Point> = way.clone();
-        if is_reversed {
-            points.reverse();
-        }
-        let is_outside = |point: &&Point| node.position.distance_mm(**point) >= node.radius_mm;
-        let aim = points.iter().find(is_outside).or(points.last()).copied().unwrap_or_default();
-        TrueWay { edge, is_reversed, bearing_rad: node.position.direction_to(aim) }
-    }
-
-    /// The node nearest to a point, and its distance in millimetres.
-    pub fn nearest_node(&self, point: Point) -> Option<(usize, f64)> {
-        let distances = self.nodes.iter().map(|node| node.distance_mm(point)).enumerate();
-        distances.min_by(|one, other| one.1.total_cmp(&other.1))
-    }
 }
 
 /// The parts of a graph but one, by their meet points.
@@ -304,14 +119,10 @@ fn unreachable(
     found
 }
 
-/// The distance to walls at the narrowest point of a way, in millimetres.
-pub(super) fn narrowest_mm(walls: &Walls, way: &[Point]) -> f64 {
-    way.iter().map(|point| walls.clearance_mm(*point)).fold(f64::INFINITY, f64::min)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::world::TrueNode;
 
     fn plan(rows: &[&str]) -> Plan {
         Plan::parse(&format!("cell_mm 500\n{}", rows.join("\n"))).unwrap()
