@@ -9,7 +9,7 @@ use csv::StringRecord;
 use serde::Deserialize;
 use toposlam::ring::{Echo, RingFrame, RingGeometry};
 
-use crate::revisits::Pose;
+use toposlam_sim::world::{Point, Pose};
 
 /// The largest ring that can be replayed. A smaller ring fills the first positions, and the others are dead.
 pub const SONARS_MAX: usize = 32;
@@ -192,7 +192,8 @@ impl Ring {
             let value: f64 = record.get(*positions.get(number)?)?.parse().ok()?;
             value.is_finite().then_some(value)
         };
-        Some(Pose { x_mm: field(0)? * self.unit.mm(), y_mm: field(1)? * self.unit.mm(), theta_rad: field(2)? })
+        let position = Point::new(field(0)? * self.unit.mm(), field(1)? * self.unit.mm());
+        Some(Pose { position, heading_rad: field(2)? })
     }
 
     fn echo(&self, field: &str) -> Echo {
@@ -250,7 +251,7 @@ mod tests {
         let columns: PoseColumns = "px,py,phi".parse().unwrap();
         let text = "a,b,c,d,px,py,phi\n1,1,1,1,100,-50,0.5\n1,1,1,1,,0,0\n1,1,1,1,0,0,nan";
         let recorded = ring.read(text.as_bytes(), Some(&columns)).unwrap();
-        let first = Pose { x_mm: 1000.0, y_mm: -500.0, theta_rad: 0.5 };
+        let first = Pose { position: Point::new(1000.0, -500.0), heading_rad: 0.5 };
         assert_eq!(recorded.poses, [Some(first), None, None]);
         let missing = ring.read("a,b,c,d\n1,2,3,4".as_bytes(), Some(&columns)).unwrap_err().to_string();
         assert!(missing.contains("\"px\""), "{missing}");

@@ -2,34 +2,11 @@
 //!
 //! The poses come from another localisation, such as a laser scan matcher. The filter does not get them.
 
-use std::f64::consts::FRAC_PI_2;
 use std::fmt;
 
+use toposlam_sim::world::{Point, Pose, length_mm};
+
 use crate::laps::Visit;
-
-/// A pose of the robot in a frame of the building.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Pose {
-    /// In millimetres.
-    pub x_mm: f64,
-    /// In millimetres.
-    pub y_mm: f64,
-    /// Counter-clockwise from the x axis, in radians.
-    pub theta_rad: f64,
-}
-
-impl Pose {
-    /// The distance between two poses.
-    pub fn distance_mm(&self, other: &Self) -> f64 {
-        (self.x_mm - other.x_mm).hypot(self.y_mm - other.y_mm)
-    }
-
-    /// Whether both headings differ by less than a right angle.
-    fn has_heading_of(&self, other: &Self) -> bool {
-        let apart_rad = (self.theta_rad - other.theta_rad).sin().atan2((self.theta_rad - other.theta_rad).cos());
-        apart_rad.abs() < FRAC_PI_2
-    }
-}
 
 /// A detection this near to a spot is a detection of it, and a pass comes this near.
 pub const NEAR_MM: f64 = 500.0;
@@ -85,7 +62,7 @@ impl Revisits {
         let mut revisits = Self { places: placed.len(), driven_mm: driven_mm(poses), ..Self::default() };
         let mut spots: Vec<(Visit, Pose)> = Vec::new();
         for &(visit, pose) in &placed {
-            if spots.iter().all(|(_, spot)| spot.distance_mm(&pose) > NEAR_MM) {
+            if spots.iter().all(|(_, spot)| spot.position.distance_mm(pose.position) > NEAR_MM) {
                 spots.push((visit, pose));
             }
         }
@@ -103,10 +80,10 @@ impl Revisits {
         // The frames of the present pass.
         let mut pass: Option<(usize, Pose)> = None;
         let mut finish = |(start, pose): (usize, Pose), end: usize| {
-            let passes = if pose.has_heading_of(at) { &mut self.same_heading } else { &mut self.other_heading };
+            let passes = if have_same_heading(&pose, at) { &mut self.same_heading } else { &mut self.other_heading };
             passes.count += 1;
             let detections = placed.iter().filter(|(visit, pose)| {
-                (start..end).contains(&(visit.frame as usize)) && pose.distance_mm(at) <= NEAR_MM
+                (start..end).contains(&(visit.frame as usize)) && pose.position.distance_mm(at.position) <= NEAR_MM
             });
             let mut detections = detections.map(|(visit, _)| visit.vertex).peekable();
             if detections.peek().is_some() {
@@ -117,7 +94,7 @@ impl Revisits {
         };
         for (frame, pose) in poses.iter().enumerate().skip(first.frame as usize + 1) {
             let Some(pose) = pose else { continue };
-            let distance_mm = pose.distance_mm(at);
+            let distance_mm = pose.position.distance_mm(at.position);
             if distance_mm > LEFT_MM {
                 has_left = true;
                 if let Some(start) = pass.take() {
@@ -136,7 +113,7 @@ impl Revisits {
         for (index, (one, at)) in placed.iter().enumerate() {
             for (other, there) in &placed[index + 1..] {
                 let (Some(one), Some(other)) = (one.vertex, other.vertex) else { continue };
-                let (is_far, is_one) = (at.distance_mm(there) > FAR_MM, one == other);
+                let (is_far, is_one) = (at.position.distance_mm(there.position) > FAR_MM, one == other);
                 self.pairs += 1;
                 self.pairs_in_one_vertex += usize::from(is_one);
                 self.far_pairs += usize::from(is_far);
@@ -146,10 +123,15 @@ impl Revisits {
     }
 }
 
+/// Whether both headings differ by less than a right angle.
+fn have_same_heading(one: &Pose, other: &Pose) -> bool {
+    (one.heading_rad - other.heading_rad).cos() > 0.0
+}
+
 /// The length of the path through the known poses.
 fn driven_mm(poses: &[Option<Pose>]) -> f64 {
-    let known: Vec<&Pose> = poses.iter().flatten().collect();
-    known.windows(2).map(|two| two[0].distance_mm(two[1])).sum()
+    let known: Vec<Point> = poses.iter().flatten().map(|pose| pose.position).collect();
+    length_mm(&known)
 }
 
 impl fmt::Display for Revisits {
@@ -194,7 +176,8 @@ mod tests {
         let leg = |leg: usize| {
             (0..40).map(move |step| {
                 let x_mm = 250.0 * f64::from(if leg.is_multiple_of(2) { step } else { 40 - step });
-                Some(Pose { x_mm, y_mm: 0.0, theta_rad: if leg.is_multiple_of(2) { 0.0 } else { 3.0 } })
+                let heading_rad = if leg.is_multiple_of(2) { 0.0 } else { 3.0 };
+                Some(Pose { position: Point::new(x_mm, 0.0), heading_rad })
             })
         };
         (0..legs).flat_map(leg).collect()
@@ -216,7 +199,7 @@ mod tests {
 
     #[test]
     fn a_robot_that_stays_near_a_spot_does_not_pass_it() {
-        let pose = |x_mm| Some(Pose { x_mm, y_mm: 0.0, theta_rad: 0.0 });
+        let pose = |x_mm| Some(Pose { position: Point::new(x_mm, 0.0), heading_rad: 0.0 });
         let there_and_back = [pose(0.0), pose(900.0), None, pose(0.0)];
         assert_eq!(Revisits::of(&[visit(0, 0)], &there_and_back).same_heading.count, 0);
         let farther = [pose(0.0), pose(1100.0), None, pose(0.0)];
