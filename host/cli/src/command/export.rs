@@ -118,7 +118,7 @@ fn replayed(path: &Path) -> Result<Listener, RecordingError> {
 
 #[cfg(not(feature = "recording"))]
 fn replayed(_: &Path) -> anyhow::Result<Listener> {
-    anyhow::bail!("this build reads no recordings; add --features recording to `cargo run --release`")
+    Err(super::missing::no_recordings())
 }
 
 fn complain_of_gaps(listener: &Listener) {

@@ -28,3 +28,9 @@ missing!(play, "recording");
 missing!(publish, "mqtt");
 #[cfg(not(feature = "recording"))]
 missing!(record, "recording");
+
+/// A FILE.mcap was given to a command that reads other sources, too.
+#[cfg(not(feature = "recording"))]
+pub(crate) fn no_recordings() -> anyhow::Error {
+    anyhow::anyhow!("this build reads no recordings; add --features recording to `cargo run --release`")
+}

@@ -104,7 +104,7 @@ fn load(arguments: &Arguments, ring: Option<Ring>) -> anyhow::Result<(Ring, Reco
 
 #[cfg(not(feature = "recording"))]
 fn load_robot_recording(_: &Path, _: Option<Ring>) -> anyhow::Result<(Ring, Recorded)> {
-    anyhow::bail!("this build reads no recordings; add --features recording to `cargo run --release`")
+    Err(super::missing::no_recordings())
 }
 
 fn print_map<const V: usize>(map: &Map<V>) {
