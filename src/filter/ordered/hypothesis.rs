@@ -97,11 +97,16 @@ impl<const V: usize, const D: usize, const T: usize> Hypothesis<V, D, T> {
     /// What it gains to be at a vertex, having come there by `reference`.
     pub(super) fn arrival(&self, model: &Model, entry: &Entry, reference: u8) -> Gain {
         let vertex = self.map.vertex(reference);
-        let label = self.label(vertex);
         Gain {
-            labels: label.including(entry.steps).evidence(model) - label.evidence(model),
+            labels: self.label_gain(model, entry, vertex),
             rest: self.ways_evidence(model, entry, vertex, reference),
         }
+    }
+
+    /// What the label of a vertex gains by another observation.
+    pub(super) fn label_gain(&self, model: &Model, entry: &Entry, vertex: u8) -> f32 {
+        let label = self.label(vertex);
+        label.including(entry.steps).evidence(model) - label.evidence(model)
     }
 
     /// What it gains to be at a new vertex.

@@ -9,7 +9,7 @@ use super::OrderedFilter;
 use super::choice::{ReportedExit, UNSEEN};
 use super::fold::{fit, fold};
 use super::hypothesis::Hypothesis;
-use super::logarithm::{self, uniform};
+use super::logarithm::{gumbel, uniform};
 use super::regrowth::Regrowth;
 use super::replay::Builder;
 use crate::filter::beam::Ranked as _;
@@ -142,7 +142,7 @@ impl<const N: usize, const V: usize, const D: usize, const T: usize> OrderedFilt
         } else if below(random, 16) < RELOCATED {
             let from = below(random, 2) * below(random, self.record.len());
             let builder = Builder { model: &self.model, record: &self.record, translation: &mut self.translation };
-            if !builder.relocate(&mut self.source, from, || FOLD_TEMPERATURE * gumbel(random)) {
+            if !builder.relocate(&mut self.source, from, || FOLD_TEMPERATURE * gumbel(random.next_u32())) {
                 return false;
             }
             Deviation::Never
@@ -231,7 +231,7 @@ impl<const N: usize, const V: usize, const D: usize, const T: usize> OrderedFilt
                 }
             }
             let temperature = self.repair.temperature;
-            let noise = || temperature * gumbel(random);
+            let noise = || temperature * gumbel(random.next_u32());
             let Some((target, followed)) = builder.decide(&mut self.draft, index, forbidden, noise) else {
                 // Nothing else explains the place, or there is no room for what does.
                 self.repair = Repair::NONE;
@@ -315,7 +315,7 @@ impl<const N: usize, const V: usize, const D: usize, const T: usize> OrderedFilt
                     for &b in source.map.ways(v) {
                         let fit = labels + fit(&self.model, source, (a, b));
                         if fit > UNFIT {
-                            rank_in(&mut drawn, (fit + FOLD_TEMPERATURE * gumbel(random), a, b));
+                            rank_in(&mut drawn, (fit + FOLD_TEMPERATURE * gumbel(random.next_u32()), a, b));
                         }
                     }
                 }
@@ -325,7 +325,7 @@ impl<const N: usize, const V: usize, const D: usize, const T: usize> OrderedFilt
         let mut chosen = (f32::NEG_INFINITY, NONE, NONE);
         for &(_, a, b) in drawn.iter().take_while(|(score, ..)| *score > f32::NEG_INFINITY) {
             if let Some(gain) = fold(&self.model, &mut self.source, &mut self.union, (a, b), len) {
-                let score = gain + FOLD_TEMPERATURE * gumbel(random);
+                let score = gain + FOLD_TEMPERATURE * gumbel(random.next_u32());
                 if score > chosen.0 {
                     chosen = (score, a, b);
                 }
@@ -349,8 +349,4 @@ fn rank_in<const K: usize>(ranked: &mut [(f32, u8, u8); K], mut pair: (f32, u8, 
 /// A random number below a bound; 0 when the bound is 0.
 pub(super) fn below(random: &mut Xoshiro128PlusPlus, bound: usize) -> usize {
     ((u64::from(random.next_u32()) * bound as u64) >> 32) as usize
-}
-
-fn gumbel(random: &mut Xoshiro128PlusPlus) -> f32 {
-    logarithm::gumbel(random.next_u32())
 }

@@ -70,10 +70,8 @@ impl<const V: usize, const D: usize, const T: usize> Hypothesis<V, D, T> {
         if !(1..=UNSEEN_LOOKS).contains(&self.label(vertex).looks) || ways.len() >= WAYS_MAX {
             return None;
         }
-        let off = |bearing: Bearing| {
-            let offs = ways.iter().map(|&way| (bearing.wrapping_sub(self.map.bearing(way)) as i16).unsigned_abs());
-            offs.min().unwrap_or(u16::MAX)
-        };
+        let off =
+            |bearing: Bearing| self.map.nearest_way(vertex, bearing).map_or(u16::MAX, |(_, off)| off.unsigned_abs());
         let mut best = (u32::MAX, None);
         for seen in entry.others() {
             for &way in ways {
@@ -91,9 +89,8 @@ impl<const V: usize, const D: usize, const T: usize> Hypothesis<V, D, T> {
 
     /// What it gains to be at a vertex, having come there by a way with this bearing that no visit has shown.
     pub(super) fn unseen_arrival(&self, model: &Model, entry: &Entry, vertex: u8, bearing: Bearing) -> Gain {
-        let label = self.label(vertex);
         Gain {
-            labels: label.including(entry.steps).evidence(model) - label.evidence(model),
+            labels: self.label_gain(model, entry, vertex),
             rest: self.ways_evidence_from(model, entry, vertex, NONE, bearing),
         }
     }
