@@ -85,7 +85,7 @@ impl DriveArguments {
         let (vertices, edges) = (map.vertices().len(), map.edges().count());
         println!("map: {vertices} vertices, {edges} edges, digest {:08x}", map_digest(map, *darts));
         if let Some(darts) = darts {
-            println!("ways that nobody has driven: {}", darts.frontiers().count());
+            println!("frontiers: {}", darts.frontiers().count());
         }
         println!("against the true map: {}", drive.against_truth());
         for line in fault_lines(faults) {

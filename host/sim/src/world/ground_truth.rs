@@ -238,6 +238,6 @@ impl fmt::Display for Report {
             self.radius_error_median_mm(),
             self.radius_error_p90_mm()
         )?;
-        write!(f, "degree: told for {} places, right for {}", self.degrees.0, self.degrees.1)
+        write!(f, "degree: reported for {} places, right for {}", self.degrees.0, self.degrees.1)
     }
 }
