@@ -24,7 +24,7 @@ use crate::robot::{Robot, RobotConfig};
 /// The number of sensors in the ring, 45° apart, counter-clockwise from straight ahead.
 pub const SONARS: usize = 8;
 /// The most hypotheses.
-pub const HYPOTHESES: usize = 2;
+pub const HYPOTHESES: usize = 4;
 /// The most vertices of a map.
 pub const VERTICES: usize = 16;
 /// The most darts of a map: three ways for each vertex, and four more.

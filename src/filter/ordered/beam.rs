@@ -4,7 +4,6 @@ use super::choice::{Choice, Gain, Target};
 use super::hypothesis::Hypothesis;
 use super::model::Model;
 use super::record::Record;
-use super::regrowth::Regrowth;
 use crate::filter::beam::{self, Candidate, Ranked as _};
 use crate::map::NONE;
 
@@ -14,49 +13,35 @@ const WORST_EXIT: f32 = -8.0;
 /// Any choice.
 const FILLER: (Choice, Gain) = (Choice { exit: NONE, target: Target::Known }, Gain { labels: 0.0, rest: 0.0 });
 
-/// What it took to grow a beam by a place.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Growth {
-    /// Whether the best of all explanations, or a way that was seen, found no room.
-    pub(super) lacks_room: bool,
-    /// How many explanations were computed.
-    pub(super) explanations: usize,
-}
-
 /// Up to `N` hypotheses. No two have the same map and the same place.
 pub(crate) type Beam<const N: usize, const V: usize, const D: usize, const T: usize> =
     beam::Beam<Hypothesis<V, D, T>, N>;
 
 impl<const N: usize, const V: usize, const D: usize, const T: usize> Beam<N, V, D, T> {
-    /// Takes observation `index` of the record: of all explanations by all hypotheses the best `N` distinct ones stay. A regrowth
-    /// forbids some and ranks them with noise.
-    pub(super) fn grow(&mut self, model: &Model, record: &Record<T>, index: usize, regrowth: &Regrowth) -> Growth {
+    /// Takes observation `index` of the record: of all explanations by all hypotheses the best `N` distinct ones stay. Returns
+    /// whether the best of all, or a way that was seen, found no room.
+    pub(super) fn grow(&mut self, model: &Model, record: &Record<T>, index: usize) -> bool {
         let mut chosen = Candidate::none(FILLER);
         let mut missed = f32::NEG_INFINITY;
-        let mut explanations = 0;
         for (slot, parent) in self.parents() {
             parent.propose(model, record, index, WORST_EXIT, |choice, gain| {
-                explanations += 1;
-                if regrowth.forbids(index, choice) {
-                    return;
-                }
-                let (map_key, key) = parent.keys_with(choice);
-                let score = parent.score() + gain.total() + regrowth.noise(map_key);
+                let score = parent.score() + gain.total();
                 if parent.has_room(choice) {
+                    let key = parent.key_with(choice);
                     Candidate { score, key, parent: slot, choice: (choice, gain) }.insert_into(&mut chosen, N);
                 } else {
                     missed = missed.max(score);
                 }
             });
         }
-        let Some(best) = chosen.as_slice().first() else { return Growth { lacks_room: true, explanations } };
+        let Some(best) = chosen.as_slice().first() else { return true };
         let mut lacks_room = missed > best.score || best.choice.0.target == Target::OffMap;
         let entry = record.get(index);
         self.replace(&mut chosen, |hypothesis, &(choice, gain), rank| {
             let is_full = hypothesis.extend(&entry, index, choice, gain, 0);
             lacks_room |= is_full && rank == 0;
         });
-        Growth { lacks_room, explanations }
+        lacks_room
     }
 
     /// Takes observation `index` of the record for a visit on the map that all hypotheses have.

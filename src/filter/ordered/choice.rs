@@ -32,11 +32,6 @@ pub(super) struct Choice {
     pub(super) target: Target,
 }
 
-impl Choice {
-    /// Any choice, all zero.
-    pub(super) const ZERO: Self = Self { exit: 0, target: Target::Known };
-}
-
 /// What the robot reported of the exit by which it left a place.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum ReportedExit {

@@ -9,7 +9,7 @@ impl<const N: usize, const V: usize, const D: usize, const T: usize> OrderedFilt
     /// Drops the oldest quarter of the record. The best hypothesis decides what it meant; its counts stay, as the base of all
     /// hypotheses from now on. Cost: as a refinement of all places.
     pub(super) fn drop_oldest(&mut self) {
-        self.stop_refinement();
+        self.repair_nothing();
         let (len, dropped) = (self.record.len(), (self.record.len() / 4).max(1));
         if let Some(best) = self.beam.best() {
             self.source.clone_from(best);

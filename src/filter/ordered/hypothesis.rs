@@ -274,8 +274,8 @@ impl<const V: usize, const D: usize, const T: usize> Hypothesis<V, D, T> {
         Closures { face: self.map.face_of(exit), connected, frontiers }
     }
 
-    /// The key that the map would have with a choice, and that of the hypothesis.
-    pub(super) fn keys_with(&self, choice: Choice) -> (u32, u32) {
+    /// The key that the hypothesis would have with a choice.
+    pub(super) fn key_with(&self, choice: Choice) -> u32 {
         // A way that no visit has shown is added first.
         let darts = self.map.darts();
         let (exit, added) = if choice.exit == UNSEEN { (darts, darts.saturating_add(1)) } else { (choice.exit, darts) };
@@ -293,7 +293,7 @@ impl<const V: usize, const D: usize, const T: usize> Hypothesis<V, D, T> {
         let from = self.map.vertex(if choice.exit == UNSEEN { self.at } else { exit });
         let map_key =
             if is_joined { self.map_key.wrapping_add(edge_key((exit, from), (at, vertex))) } else { self.map_key };
-        (map_key, keyed(map_key, at))
+        keyed(map_key, at)
     }
 
     /// Whether there is room for what a choice adds.
@@ -419,7 +419,7 @@ impl<const V: usize, const D: usize, const T: usize> Hypothesis<V, D, T> {
     }
 }
 
-pub(super) const fn mix(value: u32) -> u32 {
+const fn mix(value: u32) -> u32 {
     let value = (value ^ value >> 16).wrapping_mul(0x7FEB_352D);
     let value = (value ^ value >> 15).wrapping_mul(0x846C_A68B);
     value ^ value >> 16

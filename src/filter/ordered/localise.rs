@@ -64,7 +64,7 @@ impl<const N: usize, const V: usize, const D: usize, const T: usize> OrderedFilt
         if localise_only == self.is_localise_only() || self.beam.is_empty() {
             return;
         }
-        self.stop_refinement();
+        self.repair_nothing();
         if localise_only {
             if self.observed > 0 {
                 // The map that stays is the one that is published.

@@ -2,8 +2,7 @@
 //!
 //! A hypothesis is a map and the way by which the robot came to the newest place. While the way by which it leaves is known, the
 //! next place follows; at a frontier it is a new vertex, or any vertex with a frontier that fits. Repair builds the best maps
-//! again from the newest observations with one closure undone, or with two vertices folded onto each other. Regrowth explains the
-//! observations again from a place on.
+//! again from the newest observations with one closure undone, or with two vertices folded onto each other.
 
 mod beam;
 mod choice;
@@ -18,7 +17,6 @@ mod model;
 mod noise;
 mod publish;
 mod record;
-mod regrowth;
 mod repair;
 mod replay;
 #[cfg(test)]
@@ -45,7 +43,6 @@ use fold::Union;
 use hypothesis::{DARTS_MAX, Hypothesis};
 use model::{Model, SAME_WAY};
 use record::{Entry, Record};
-use regrowth::Regrowth;
 use repair::Repair;
 use translation::Translation;
 
@@ -56,7 +53,7 @@ const NOISE_FROM: u32 = 10;
 /// the newest `T` places. Repairs can revise what the history contains.
 ///
 /// The filter is const-constructed, to zero, so that a `static` of it is in `.bss`, and initialised in place by [`Filter::start`]. Memory:
-/// about `(2 · N + 4) · (20 · V + 8 · D + T)` bytes and 12 bytes a place of the history. The same observations, seed and calls of
+/// about `(N + 4) · (20 · V + 8 · D + T)` bytes and 12 bytes a place of the history. The same observations, seed and calls of
 /// [`Filter::refine`] give the same result on every target.
 ///
 /// ```
@@ -92,9 +89,6 @@ pub struct OrderedFilter<const N: usize, const V: usize, const D: usize, const T
     translation: Translation<V, D>,
     union: Union<D>,
     pub(crate) repair: Repair,
-    pub(crate) regrowth: Regrowth,
-    /// The hypotheses of the regrowth.
-    regrown: Beam<N, V, D, T>,
     /// The best hypothesis before the record begins.
     pub(crate) base: Hypothesis<V, D, T>,
     pub(crate) vertex_ids: VertexIds<V>,
@@ -133,8 +127,6 @@ impl<const N: usize, const V: usize, const D: usize, const T: usize> OrderedFilt
             translation: Translation::new(),
             union: Union::new(),
             repair: Repair::NONE,
-            regrowth: Regrowth::NONE,
-            regrown: Beam::new(),
             base: Hypothesis::UNUSED,
             vertex_ids: VertexIds::new(),
             map: Map::new(),
@@ -202,9 +194,6 @@ impl<const N: usize, const V: usize, const D: usize, const T: usize> OrderedFilt
         let model = &self.model;
         self.beam.for_each(|hypothesis| hypothesis.weigh_labels(model));
         self.beam.sort();
-        if self.regrowth.is_under_way() {
-            self.regrown.for_each(|hypothesis| hypothesis.weigh_labels(model));
-        }
     }
 
     /// Replaces all hypotheses by one that takes the places for given vertices and ways of a map; for evaluations.
@@ -217,7 +206,7 @@ impl<const N: usize, const V: usize, const D: usize, const T: usize> OrderedFilt
             *slot = dart;
         }
         self.rebuild(0, path.len())?;
-        self.stop_refinement();
+        self.repair_nothing();
         self.beam.start_with(&self.draft);
         self.publish();
         Some(self.draft.score())
@@ -245,8 +234,7 @@ impl<const N: usize, const V: usize, const D: usize, const T: usize> Filter<V> f
         self.record.clear();
         self.beam.clear();
         self.base.clear();
-        self.stop_refinement();
-        self.regrown.clear();
+        self.repair_nothing();
         self.vertex_ids.clear();
         self.map.clear();
         self.darts.clear();
@@ -297,7 +285,7 @@ impl<const N: usize, const V: usize, const D: usize, const T: usize> Filter<V> f
             self.localise(index);
             return self.publish();
         }
-        if self.beam.grow(&self.model, &self.record, index, &Regrowth::NONE).lacks_room {
+        if self.beam.grow(&self.model, &self.record, index) {
             self.faults.record(FaultKind::VerticesFull);
         }
         if self.observed >= NOISE_FROM && self.observed.is_multiple_of(5) {
@@ -306,8 +294,7 @@ impl<const N: usize, const V: usize, const D: usize, const T: usize> Filter<V> f
         self.publish()
     }
 
-    /// Runs a part of a repair or of a regrowth, or all of it if it is short. Cost: at most 300 places that are followed, 25 decisions, or the
-    /// explanations of places until there are 350.
+    /// Runs a part of a repair, or all of it if it is short. Cost: at most 300 places that are followed, or 25 decisions.
     fn refine(&mut self) {
         if !self.is_localise_only() {
             self.repair();

@@ -10,7 +10,6 @@ use super::choice::{ReportedExit, UNSEEN};
 use super::fold::{fit, fold};
 use super::hypothesis::Hypothesis;
 use super::logarithm::{gumbel, uniform};
-use super::regrowth::Regrowth;
 use super::replay::Builder;
 use crate::filter::beam::Ranked as _;
 use crate::filter::draws;
@@ -20,9 +19,6 @@ use rand_xoshiro::Xoshiro128PlusPlus;
 
 /// Vertices are not considered for a fold when labels and ways speak against it by more than this, in nats.
 const UNFIT: f32 = -14.0;
-
-/// Of 16 steps, how many go to a regrowth that is under way.
-const REGROWTHS: usize = 12;
 
 /// How many folds are looked at before one is made.
 const FOLDS: usize = 8;
@@ -90,11 +86,10 @@ impl Repair {
 }
 
 impl<const N: usize, const V: usize, const D: usize, const T: usize> OrderedFilter<N, V, D, T> {
-    /// Runs one refinement step: a repair, a regrowth, or a part of one that is too long for a step. The next
-    /// [`OrderedFilter::observe`] takes what comes out. Regrowths and repairs take turns.
+    /// Runs one refinement step: a repair, or a part of one that is too long for a step. The next [`OrderedFilter::observe`]
+    /// takes what comes out.
     ///
-    /// Cost: at most `WORK` places or `WORK / DECISION` decisions of a repair, or the places of a regrowth up to `EXPLANATIONS`; the choice
-    /// of a fold is O(V² + D²).
+    /// Cost: at most `WORK` places or `WORK / DECISION` decisions; the choice of a fold is O(V² + D²).
     pub(super) fn repair(&mut self) {
         if self.record.len() < 3 {
             return;
@@ -102,12 +97,6 @@ impl<const N: usize, const V: usize, const D: usize, const T: usize> OrderedFilt
         let piece = u64::from(self.observed) << 16 | u64::from(self.refined);
         self.refined += 1;
         let mut random = draws(self.seed, piece);
-        if !self.regrowth.is_under_way() && self.repair.next.is_none() && self.repair.chained == 0 {
-            return self.start_regrowth(&mut random);
-        }
-        if self.regrowth.is_under_way() && below(&mut random, 16) < REGROWTHS {
-            return self.continue_regrowth();
-        }
         if self.repair.next.is_none() && !self.start_repair(&mut random) {
             self.repair_nothing();
             return;
@@ -255,14 +244,8 @@ impl<const N: usize, const V: usize, const D: usize, const T: usize> OrderedFilt
         }
     }
 
-    /// Gives up what is under way.
-    pub(crate) fn stop_refinement(&mut self) {
-        self.repair_nothing();
-        self.regrowth = Regrowth::NONE;
-    }
-
     /// Gives up the repair that is under way.
-    pub(super) fn repair_nothing(&mut self) {
+    pub(crate) fn repair_nothing(&mut self) {
         self.repair = Repair::NONE;
     }
 
@@ -347,6 +330,6 @@ fn rank_in<const K: usize>(ranked: &mut [(f32, u8, u8); K], mut pair: (f32, u8, 
 }
 
 /// A random number below a bound; 0 when the bound is 0.
-pub(super) fn below(random: &mut Xoshiro128PlusPlus, bound: usize) -> usize {
+fn below(random: &mut Xoshiro128PlusPlus, bound: usize) -> usize {
     ((u64::from(random.next_u32()) * bound as u64) >> 32) as usize
 }

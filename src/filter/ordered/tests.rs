@@ -221,30 +221,3 @@ fn a_hypothesis_built_again_along_its_own_path_is_the_same() {
         }
     }
 }
-
-#[test]
-fn a_regrowth_undoes_what_the_rest_of_the_map_was_built_on() {
-    let mut filter = Box::new(Small::new());
-    for seed in 0..10 {
-        filter.start(CONFIG, seed).unwrap();
-        let walk = HOUSE.walk(60, seed, |_| false);
-        run(&mut filter, &walk);
-        let score = filter.score();
-        // The only hypothesis left is one that took an early place for another.
-        let right = filter.beam.get(0).unwrap().clone();
-        let wrong = Regrowth::forbidding(&mut filter, &right, 4);
-        filter.regrown.start_with(&filter.base.clone());
-        (0..walk.len()).for_each(|index| {
-            filter.regrown.grow(&filter.model, &filter.record, index, &wrong);
-        });
-        let wrong = filter.regrown.get(0).unwrap().clone();
-        assert!(wrong.score() < score - 5.0, "seed {seed}: {} {score}", wrong.score());
-        filter.stop_refinement();
-        filter.beam.start_with(&wrong);
-        for _ in 0..200 {
-            filter.refine();
-        }
-        filter.refresh();
-        assert!(HOUSE.is_mapped(&filter, &walk) && filter.score() > score - 0.5, "seed {seed}");
-    }
-}

@@ -1,6 +1,6 @@
 //! The ordered filter in a snapshot: the places of the history, the published map, and the hypotheses.
 //!
-//! Every hypothesis is saved as it is, so that a restored filter continues bit for bit. A repair or regrowth under way is not saved;
+//! Every hypothesis is saved as it is, so that a restored filter continues bit for bit. A repair under way is not saved;
 //! saving ends it in the running filter too.
 
 mod hypothesis;
@@ -60,7 +60,7 @@ impl<const N: usize, const V: usize, const D: usize, const T: usize> Persist for
     /// [`SnapshotError::Full`] if there is no room for the best hypothesis.
     #[inline(never)]
     fn save(&mut self, writer: &mut Writer<'_>) -> Result<(), SnapshotError> {
-        self.stop_refinement();
+        self.repair_nothing();
         self.head().save::<V, D, T>(writer)?;
         let len = self.record.len();
         writer.u16(len as u16)?;
@@ -81,13 +81,13 @@ impl<const N: usize, const V: usize, const D: usize, const T: usize> Persist for
     ///
     /// # Errors
     /// [`SnapshotError::Capacities`] for another kind of filter or other capacities, [`SnapshotError::TooShort`], or
-    /// [`SnapshotError::Contents`]; the filter does not change then, but a repair or regrowth under way ends.
+    /// [`SnapshotError::Contents`]; the filter does not change then, but a repair under way ends.
     fn restore(&mut self, section: Reader<'_>) -> Result<(), SnapshotError> {
         self.check(section)?;
         self.read(section, true)
     }
 
-    /// A repair or regrowth under way ends. Cost: one pass over the bytes.
+    /// A repair under way ends. Cost: one pass over the bytes.
     fn check(&mut self, section: Reader<'_>) -> Result<(), SnapshotError> {
         self.read(section, false)
     }
@@ -97,7 +97,7 @@ impl<const N: usize, const V: usize, const D: usize, const T: usize> OrderedFilt
     /// Reads a section. `kept` replaces the state; otherwise only the draft changes.
     #[inline(never)]
     fn read(&mut self, mut from: Reader<'_>, kept: bool) -> Result<(), SnapshotError> {
-        self.stop_refinement();
+        self.repair_nothing();
         let head = Head::read::<V, D, T>(&mut from)?;
         let len = usize::from(from.u16()?);
         if len > T
