@@ -7,7 +7,7 @@ use crate::mapper::{Mapper, MapperConfig};
 use crate::robot::{Robot, RobotConfig};
 
 /// The most hypotheses.
-pub const HYPOTHESES: usize = 10;
+pub const HYPOTHESES: usize = 9;
 /// The most vertices of a map.
 pub const VERTICES: usize = 64;
 /// The most darts of a map: three ways for each vertex.

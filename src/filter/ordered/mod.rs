@@ -2,11 +2,13 @@
 //!
 //! A hypothesis is a map and the way by which the robot came to the newest place. While the way by which it leaves is known, the
 //! next place follows; at a frontier it is a new vertex, or any vertex with a frontier that fits. Repair builds the best maps
-//! again from the newest observations with one closure undone, or with two vertices folded onto each other.
+//! again from the newest observations with one closure undone, with two vertices folded onto each other, or
+//! with a part of the map removed.
 
 mod beam;
 mod choice;
 mod config;
+mod decode;
 mod fold;
 mod history;
 mod hypothesis;
@@ -17,6 +19,7 @@ mod model;
 mod noise;
 mod publish;
 mod record;
+mod removal;
 mod repair;
 mod replay;
 #[cfg(test)]
@@ -39,6 +42,7 @@ use crate::fault::{FaultCounters, FaultKind};
 use crate::filter::beam::Ranked as _;
 use crate::map::{DartId, DartMap, Darts, Map, NONE, PerVertex, VertexId};
 use beam::Beam;
+use decode::Decoder;
 use fold::Union;
 use hypothesis::{DARTS_MAX, Hypothesis};
 use model::{Model, SAME_WAY};
@@ -88,6 +92,7 @@ pub struct OrderedFilter<const N: usize, const V: usize, const D: usize, const T
     source: Hypothesis<V, D, T>,
     translation: Translation<V, D>,
     union: Union<D>,
+    decoder: Decoder,
     pub(crate) repair: Repair,
     /// The best hypothesis before the record begins.
     pub(crate) base: Hypothesis<V, D, T>,
@@ -126,6 +131,7 @@ impl<const N: usize, const V: usize, const D: usize, const T: usize> OrderedFilt
             source: Hypothesis::UNUSED,
             translation: Translation::new(),
             union: Union::new(),
+            decoder: Decoder::new(),
             repair: Repair::NONE,
             base: Hypothesis::UNUSED,
             vertex_ids: VertexIds::new(),

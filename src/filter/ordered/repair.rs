@@ -3,7 +3,7 @@
 //! A repair starts from one of the hypotheses, its source, and builds a draft from the record. The draft follows the path of the
 //! source until it has to leave it: at a decision that is forbidden, at a place from which on all is decided again, or where the
 //! source contradicts itself because two of its vertices were folded onto each other. From there on decisions look ahead, until the
-//! draft is where the source is. A draft that is better than the worst hypothesis becomes one.
+//! draft is where the source is. When a part of the source was removed, its path is decoded first. A draft that is better than the worst hypothesis becomes one.
 
 use super::OrderedFilter;
 use super::choice::{ReportedExit, UNSEEN};
@@ -29,9 +29,10 @@ const WORK: u32 = 300;
 /// The work of one decision.
 const DECISION: u32 = 12;
 
-/// Of 16 repairs, how many start from the best hypothesis in any case, and how many fold two vertices; of 16 others, how many decide
-/// everything again.
+/// Of 16 repairs, how many start from the best hypothesis in any case, and how many remove a part of the map; of 16 others, how many
+/// fold two vertices; of 16 others, how many decide everything again.
 const BEST: usize = 4;
+const REMOVED: usize = 10;
 const FOLDED: usize = 6;
 const RESTARTS: usize = 2;
 /// And how many relocate the robot.
@@ -78,18 +79,35 @@ pub(crate) struct Repair {
     temperature: f32,
     /// How many repairs in sequence started from a draft that is no hypothesis.
     chained: u8,
+    /// Whether the path of the source is being decoded, before the draft is built.
+    decodes: bool,
 }
 
 impl Repair {
     pub(crate) const NONE: Self =
-        Self { next: None, deviation: Deviation::Never, follows: false, temperature: 0.0, chained: 0 };
+        Self { next: None, deviation: Deviation::Never, follows: false, temperature: 0.0, chained: 0, decodes: false };
+
+    /// The path of the source is to be decoded.
+    pub(super) fn decode(&mut self) {
+        *self = Self { next: Some(0), decodes: true, chained: self.chained, ..Self::NONE };
+    }
+
+    /// It is decoded up to a place.
+    pub(super) fn decode_from(&mut self, next: usize) {
+        self.next = Some(next);
+    }
+
+    /// It is decoded, and the draft is to be built along it.
+    pub(super) fn build(&mut self) {
+        *self = Self { next: Some(0), follows: true, chained: self.chained, ..Self::NONE };
+    }
 }
 
 impl<const N: usize, const V: usize, const D: usize, const T: usize> OrderedFilter<N, V, D, T> {
     /// Runs one refinement step: a repair, or a part of one that is too long for a step. The next [`OrderedFilter::observe`]
     /// takes what comes out.
     ///
-    /// Cost: at most `WORK` places or `WORK / DECISION` decisions; the choice of a fold is O(V² + D²).
+    /// Cost: at most `WORK` places or `WORK / DECISION` decisions, or the arrivals of a part of a decoding; the choice of a fold is O(V² + D²).
     pub(super) fn repair(&mut self) {
         if self.record.len() < 3 {
             return;
@@ -123,6 +141,9 @@ impl<const N: usize, const V: usize, const D: usize, const T: usize> OrderedFilt
             _ => None,
         };
         self.take_source(rank);
+        if below(random, 16) < REMOVED {
+            return self.remove_some(random);
+        }
         let deviation = if below(random, 16) < FOLDED {
             if !self.fold_two(random, rank) {
                 return false;
@@ -148,7 +169,8 @@ impl<const N: usize, const V: usize, const D: usize, const T: usize> OrderedFilt
             Deviation::From(1 + below(random, self.record.len() - 1))
         };
         let temperature = if deviation == Deviation::Never { 0.0 } else { TEMPERATURE * uniform(random.next_u32()) };
-        self.repair = Repair { next: Some(0), deviation, follows: true, temperature, chained: self.repair.chained };
+        self.repair.build();
+        (self.repair.deviation, self.repair.temperature) = (deviation, temperature);
         self.start_draft();
         true
     }
@@ -188,6 +210,12 @@ impl<const N: usize, const V: usize, const D: usize, const T: usize> OrderedFilt
     /// Builds on the draft. Returns whether it explains the whole record.
     fn continue_repair(&mut self, random: &mut Xoshiro128PlusPlus) -> bool {
         let Some(mut index) = self.repair.next else { return false };
+        if self.repair.decodes {
+            if !self.continue_decoding(index) {
+                return false;
+            }
+            index = 0;
+        }
         let mut builder = Builder { model: &self.model, record: &self.record, translation: &mut self.translation };
         let mut work = 0;
         while index < self.record.len() && work < WORK {
@@ -264,7 +292,7 @@ impl<const N: usize, const V: usize, const D: usize, const T: usize> OrderedFilt
     }
 
     /// The draft as it was before the record begins.
-    fn start_draft(&mut self) {
+    pub(super) fn start_draft(&mut self) {
         self.draft.clone_from(&self.base);
         self.translation.start(self.base.map.vertices(), self.base.map.darts());
     }
@@ -330,6 +358,6 @@ fn rank_in<const K: usize>(ranked: &mut [(f32, u8, u8); K], mut pair: (f32, u8, 
 }
 
 /// A random number below a bound; 0 when the bound is 0.
-fn below(random: &mut Xoshiro128PlusPlus, bound: usize) -> usize {
+pub(super) fn below(random: &mut Xoshiro128PlusPlus, bound: usize) -> usize {
     ((u64::from(random.next_u32()) * bound as u64) >> 32) as usize
 }

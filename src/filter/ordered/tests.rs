@@ -2,6 +2,7 @@
 
 use super::*;
 use crate::filter::{Ways, draws};
+use crate::map::VertexSet;
 use crate::place::Fingerprint;
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -219,5 +220,82 @@ fn a_hypothesis_built_again_along_its_own_path_is_the_same() {
             assert_eq!(filter.draft.key(), filter.source.key());
             assert_eq!(filter.draft.map.edges().count(), filter.source.map.edges().count());
         }
+    }
+}
+
+#[test]
+fn a_decoded_path_is_the_best_one_along_known_ways() {
+    let mut filter = Box::new(Small::new());
+    for seed in 0..20 {
+        filter.start(CONFIG, seed).unwrap();
+        let walk = HOUSE.walk(40, seed, |step| step % 7 == 3);
+        run(&mut filter, &walk);
+        filter.source.clone_from(filter.beam.get(0).unwrap());
+        let (first, last) = (8 + seed as usize, 14 + seed as usize);
+        filter.source.path[first..=last].fill(NONE);
+        filter.decoder.start(VertexSet::EMPTY, (NONE, NONE));
+        let mut next = 0;
+        while next < walk.len() {
+            next = filter.decoder.run(&filter.model, &filter.record, &mut filter.source, next, 50).0;
+        }
+        let (source, model, record) = (&filter.source, &filter.model, &filter.record);
+        let gain = |index: usize, before: u8, now: u8| {
+            let exit = source.map.partner(now).filter(|&exit| source.map.vertex(exit) == source.map.vertex(before))?;
+            let ways = source.map.ways(source.map.vertex(before)).len();
+            let entry = record.get(index);
+            let exit = source.reported_exit(record, index, before).ln(model, exit, ways);
+            let travel = model.travel(source.map.travel(now), entry.ln_travel);
+            Some(f64::from(exit) + f64::from(travel) + f64::from(source.arrival(model, &entry, now).total()))
+        };
+        // The best path to each dart, from the place before the gap.
+        let mut best = BTreeMap::from([(source.came_by(first - 1), 0.0)]);
+        let mut decoded = 0.0;
+        for index in first..=last {
+            let to = |now| {
+                let from = best.iter().filter_map(|(&before, score)| Some(score + gain(index, before, now)?));
+                Some((now, from.max_by(f64::total_cmp)?))
+            };
+            best = (0..source.map.darts()).filter_map(to).collect();
+            decoded += gain(index, source.came_by(index - 1), source.came_by(index)).expect("a known way");
+        }
+        let score = best[&source.came_by(last)];
+        assert!((decoded - score).abs() < 1e-2, "seed {seed}: {decoded} {score}");
+    }
+}
+
+#[test]
+fn a_building_that_is_on_the_map_twice_becomes_one_again() {
+    let mut filter = Box::new(Small::new());
+    for seed in 0..10 {
+        filter.start(CONFIG, seed).unwrap();
+        let mut walk = HOUSE.walk(60, seed, |_| false);
+        walk[30].1.starts_sequence = true;
+        run(&mut filter, &walk);
+        let score = filter.score();
+        // The only hypothesis left takes the second half for a building of its own.
+        filter.source.clear();
+        for place in (0..2).flat_map(|_| 0..HOUSE.ways.len()) {
+            let vertex = filter.source.map.add_vertex().unwrap();
+            for &(bearing_mrad, ..) in HOUSE.ways[place] {
+                filter.source.map.add_way(vertex, (u32::from(bearing_mrad) * 65536 / 6283) as u16).unwrap();
+            }
+        }
+        let darts = filter.source.map.darts() / 2;
+        for dart in 0..2 * darts {
+            let copy = dart / darts * darts;
+            filter.source.map.join(dart, HOUSE.way(usize::from(dart - copy)).1 as u8 + copy);
+        }
+        for (index, &(dart, _)) in walk.iter().enumerate() {
+            filter.source.path[index] = dart as u8 + if index < 30 { 0 } else { darts };
+        }
+        filter.repair_nothing();
+        assert!(filter.rebuild(0, walk.len()).is_some());
+        assert!(filter.draft.map.vertices() == 6 && filter.draft.score() < score - 5.0);
+        filter.beam.start_with(&filter.draft);
+        for _ in 0..200 {
+            filter.refine();
+        }
+        filter.refresh();
+        assert!(filter.darts.vertices() == 3 && filter.score() > score - 0.5, "seed {seed}");
     }
 }

@@ -1,0 +1,336 @@
+//! Decoding: the path that explains the record best on the map of the source, where that path is broken.
+//!
+//! A repair that removes vertices or edges of its source leaves the path of the source broken. The decoder follows the path up to
+//! some places before a break, keeps the best few ways by which the robot may have come to each place from there on (a beam of the Viterbi
+//! algorithm), and stops where the best of them is on the path again. The map does not change but for edges between two frontiers that
+//! the decoded path passes.
+
+use super::choice::{ReportedExit, UNSEEN};
+use super::hypothesis::Hypothesis;
+use super::model::Model;
+use super::record::Record;
+use crate::map::{NONE, VertexId, VertexSet};
+
+/// How many ways are kept for a place.
+const STATES: usize = 8;
+
+/// How many places are decided together.
+const LAG: usize = 48;
+
+/// The decoder starts this many places before a break.
+const BEFORE: usize = 4;
+
+/// Ways that are this much less likely than the best one are dropped, in nats.
+const UNLIKELY: f32 = 16.0;
+
+/// When all others are this much less likely, the path is taken.
+const CERTAIN: f32 = 6.0;
+
+/// Exits that cost more than this are not considered, in nats.
+const WORST_EXIT: f32 = -8.0;
+
+/// A way by which the robot may have come to a place: [`NONE`] for a place that is not on the map.
+#[derive(Clone, Copy, Debug)]
+struct State {
+    came_by: u8,
+    /// The position of the state before it.
+    before: u8,
+}
+
+impl State {
+    const ZERO: Self = Self { came_by: 0, before: 0 };
+}
+
+/// The states of the newest places, and how likely the last ones are.
+#[derive(Clone, Debug)]
+pub(super) struct Decoder {
+    states: [[State; STATES]; LAG],
+    scores: [f32; STATES],
+    /// How many states the newest place has.
+    count: u8,
+    /// How many places are decided together so far; 0 when the path is followed.
+    places: u8,
+    /// Vertices that are no longer on the map.
+    removed: VertexSet,
+    /// Two frontiers that no edge joins.
+    apart: (u8, u8),
+}
+
+/// The best few states of the next place.
+struct Next {
+    states: [State; STATES],
+    scores: [f32; STATES],
+    count: usize,
+    /// How many states were looked at.
+    work: u32,
+}
+
+impl Next {
+    const fn new() -> Self {
+        Self { states: [State::ZERO; STATES], scores: [0.0; STATES], count: 0, work: 0 }
+    }
+
+    /// Inserts a state, or replaces the same one if this is better.
+    fn insert(&mut self, came_by: u8, before: usize, score: f32) {
+        let same = self.states.iter().take(self.count).position(|state| state.came_by == came_by);
+        let mut position = match same {
+            Some(same) if self.scores.get(same).is_none_or(|&held| held >= score) => return,
+            Some(same) => same,
+            None if self.count < STATES => {
+                self.count += 1;
+                self.count - 1
+            }
+            None if self.scores.last().is_none_or(|&worst| worst >= score) => return,
+            None => STATES - 1,
+        };
+        while let Some(ahead) = position.checked_sub(1)
+            && self.scores.get(ahead).is_some_and(|&held| held < score)
+        {
+            if let (Some(&state), Some(&held)) = (self.states.get(ahead), self.scores.get(ahead)) {
+                set(&mut self.states, position, state);
+                set(&mut self.scores, position, held);
+            }
+            position = ahead;
+        }
+        set(&mut self.states, position, State { came_by, before: before as u8 });
+        set(&mut self.scores, position, score);
+    }
+
+    /// How much worse than the best state one would be.
+    fn behind(&self, score: f32) -> f32 {
+        if self.count == 0 { 0.0 } else { self.scores.first().map_or(0.0, |best| best - score) }
+    }
+}
+
+fn set<S: Copy>(slots: &mut [S], position: usize, item: S) {
+    if let Some(slot) = slots.get_mut(position) {
+        *slot = item;
+    }
+}
+
+impl Decoder {
+    pub(super) const fn new() -> Self {
+        Self {
+            states: [[State::ZERO; STATES]; LAG],
+            scores: [0.0; STATES],
+            count: 0,
+            places: 0,
+            removed: VertexSet::EMPTY,
+            apart: (0, 0),
+        }
+    }
+
+    /// Starts at the beginning of the record, with vertices that are no longer on the map, and two frontiers that no edge joins.
+    pub(super) fn start(&mut self, removed: VertexSet, apart: (u8, u8)) {
+        self.removed = removed;
+        self.apart = apart;
+        self.places = 0;
+    }
+
+    fn is_removed(&self, vertex: u8) -> bool {
+        VertexId::new(vertex).is_some_and(|vertex| self.removed.contains(vertex))
+    }
+
+    /// Decodes from place `index` on until `work` states were looked at. Returns the next place; the length of the record at the end.
+    pub(super) fn run<const V: usize, const D: usize, const T: usize>(
+        &mut self,
+        model: &Model,
+        record: &Record<T>,
+        on: &mut Hypothesis<V, D, T>,
+        mut index: usize,
+        work: u32,
+    ) -> (usize, u32) {
+        let mut done = 0;
+        while index < record.len() && done < work {
+            if self.places == 0 {
+                // The next break, from some places before it.
+                let Some(broken) = (index..record.len()).find(|&place| self.is_broken(record, on, place)) else {
+                    return (record.len(), done);
+                };
+                index = broken.saturating_sub(BEFORE).max(index);
+                if let Some(before) = index.checked_sub(1)
+                    && on.came_by(before) < UNSEEN
+                {
+                    self.begin(State { came_by: on.came_by(before), before: 0 });
+                }
+            }
+            let next = self.step(model, record, on, index);
+            done += next.work;
+            self.accept(&next);
+            index += 1;
+            let is_certain = self.count == 1 || self.scores.get(1).is_some_and(|&second| second < -CERTAIN);
+            let best = self.best();
+            let goes_on = index < record.len() && self.is_broken_before(record, on, index);
+            if is_certain && best == on.came_by(index - 1) && best != NONE && !goes_on {
+                self.take(record, on, index);
+                self.places = 0;
+            } else if usize::from(self.places) == LAG {
+                self.take(record, on, index);
+                self.begin(State { came_by: best, before: 0 });
+            }
+        }
+        if index == record.len() && self.places > 0 {
+            self.take(record, on, index);
+            self.places = 0;
+        }
+        (index, done)
+    }
+
+    /// Whether the path is broken at one of the next places.
+    fn is_broken_before<const V: usize, const D: usize, const T: usize>(
+        &self,
+        record: &Record<T>,
+        on: &Hypothesis<V, D, T>,
+        index: usize,
+    ) -> bool {
+        (index..(index + BEFORE).min(record.len())).any(|place| self.is_broken(record, on, place))
+    }
+
+    /// Whether the map says nothing of how the path comes to a place.
+    fn is_broken<const V: usize, const D: usize, const T: usize>(
+        &self,
+        record: &Record<T>,
+        on: &Hypothesis<V, D, T>,
+        index: usize,
+    ) -> bool {
+        let came_by = on.came_by(index);
+        if came_by >= UNSEEN || self.is_removed(on.map.vertex(came_by)) {
+            return true;
+        }
+        if record.get(index).starts() || index == 0 {
+            return false;
+        }
+        let before = on.came_by(index - 1);
+        on.map.partner(came_by).is_none_or(|exit| before < UNSEEN && on.map.vertex(exit) != on.map.vertex(before))
+    }
+
+    fn begin(&mut self, state: State) {
+        self.count = 1;
+        self.places = 1;
+        set(&mut self.scores, 0, 0.0);
+        if let Some(first) = self.states.first_mut() {
+            set(first, 0, state);
+        }
+    }
+
+    fn best(&self) -> u8 {
+        self.states
+            .get(usize::from(self.places).wrapping_sub(1))
+            .and_then(|states| states.first())
+            .map_or(NONE, |best| best.came_by)
+    }
+
+    /// The states of the next place, with scores relative to the best one.
+    fn accept(&mut self, next: &Next) {
+        let best = next.scores.first().copied().unwrap_or(0.0);
+        let likely = next.scores.iter().take(next.count).take_while(|&&score| score > best - UNLIKELY).count();
+        self.count = likely as u8;
+        for (slot, &score) in self.scores.iter_mut().zip(&next.scores) {
+            *slot = score - best;
+        }
+        if let Some(states) = self.states.get_mut(usize::from(self.places)) {
+            *states = next.states;
+            self.places += 1;
+        }
+    }
+
+    /// Writes the best states into the path, `end` being the place after the newest. Joins frontiers between which the path goes.
+    fn take<const V: usize, const D: usize, const T: usize>(
+        &mut self,
+        record: &Record<T>,
+        on: &mut Hypothesis<V, D, T>,
+        end: usize,
+    ) {
+        let places = usize::from(self.places);
+        let mut position = 0;
+        for back in 1..=places {
+            let state = self.states.get(places - back).and_then(|states| states.get(position)).copied();
+            let state = state.unwrap_or(State::ZERO);
+            set(&mut on.path, end - back, state.came_by);
+            position = usize::from(state.before);
+        }
+        for index in end - places + 1..end {
+            let (before, now) = (on.came_by(index - 1), on.came_by(index));
+            if before >= UNSEEN || now >= UNSEEN || record.get(index).starts() || on.map.partner(now).is_some() {
+                continue;
+            }
+            if let ReportedExit::Way(exit) = on.reported_exit(record, index, before) {
+                on.map.join(exit, now);
+            }
+        }
+    }
+
+    fn step<const V: usize, const D: usize, const T: usize>(
+        &self,
+        model: &Model,
+        record: &Record<T>,
+        on: &Hypothesis<V, D, T>,
+        index: usize,
+    ) -> Next {
+        let mut next = Next::new();
+        let entry = record.get(index);
+        let anywhere = model.ln_of(on.map.darts().into());
+        let off_map = on.new_arrival(model, &entry).total();
+        let arrive = |next: &mut Next, dart: u8, before: usize, cost: f32| {
+            if on.map.vertex(dart) == NONE
+                || self.is_removed(on.map.vertex(dart))
+                || on.is_far(model, entry.steps, on.map.vertex(dart))
+            {
+                return;
+            }
+            next.work += 1;
+            next.insert(dart, before, cost + on.arrival(model, &entry, dart).total());
+        };
+        if self.places == 0 {
+            (0..on.map.darts()).for_each(|dart| arrive(&mut next, dart, 0, -anywhere));
+            next.insert(NONE, 0, off_map);
+            return next;
+        }
+        let states = self.states.get(usize::from(self.places) - 1).copied().unwrap_or([State::ZERO; STATES]);
+        for (before, (state, &score)) in states.iter().zip(&self.scores).take(self.count.into()).enumerate() {
+            if state.came_by == NONE || entry.starts() {
+                next.insert(NONE, before, score + off_map);
+                if next.behind(score - anywhere) > 30.0 {
+                    continue;
+                }
+                (0..on.map.darts()).for_each(|dart| arrive(&mut next, dart, before, score - anywhere));
+                continue;
+            }
+            next.insert(NONE, before, score + off_map - 10.0);
+            let reported = on.reported_exit(record, index, state.came_by);
+            let ways = on.map.ways(on.map.vertex(state.came_by));
+            if reported == ReportedExit::Unseen {
+                let cost = score + reported.ln(model, UNSEEN, ways.len() + 1);
+                next.insert(NONE, before, cost + off_map);
+            }
+            for &exit in ways {
+                let exit_cost = reported.ln(model, exit, ways.len());
+                let cost = score + exit_cost;
+                if exit_cost < WORST_EXIT {
+                    continue;
+                }
+                match on.map.partner(exit) {
+                    Some(partner) if !self.is_removed(on.map.vertex(partner)) => {
+                        if next.behind(cost) < 40.0 {
+                            let travel = model.travel(on.map.travel(partner), entry.ln_travel);
+                            arrive(&mut next, partner, before, cost + travel);
+                        }
+                    }
+                    _ => {
+                        next.insert(NONE, before, cost + off_map);
+                        if reported == ReportedExit::Way(exit) {
+                            let frontiers = on.map.frontiers().count();
+                            let closure = cost + model.closure(frontiers, true) + model.travel((0, 0), entry.ln_travel);
+                            for frontier in on.map.frontiers().filter(|&frontier| {
+                                frontier != exit && ![(exit, frontier), (frontier, exit)].contains(&self.apart)
+                            }) {
+                                arrive(&mut next, frontier, before, closure);
+                            }
+                        }
+                    }
+                }
+            }
+        }
+        next
+    }
+}
