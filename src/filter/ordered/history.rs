@@ -14,8 +14,8 @@ impl<const N: usize, const V: usize, const D: usize, const T: usize> OrderedFilt
         if let Some(best) = self.beam.best() {
             self.source.clone_from(best);
         }
-        let forgotten = self.base.rest;
         let before = self.rebuild(0, dropped);
+        let forgotten = self.draft.rest;
         self.draft.fade(&self.model);
         self.remove_doubtful_ways();
         self.base.clone_from(&self.draft);

@@ -224,6 +224,24 @@ fn a_hypothesis_built_again_along_its_own_path_is_the_same() {
 }
 
 #[test]
+fn a_hypothesis_built_again_scores_the_same_after_old_places_have_left_the_record() {
+    let mut filter = Box::new(Small::new());
+    for seed in 0..5 {
+        filter.start(CONFIG, seed).unwrap();
+        let walk = HOUSE.walk(100, seed, |step| step % 9 == 4);
+        run(&mut filter, &walk[..60]);
+        walk[60..].iter().for_each(|(_, observation)| {
+            filter.observe(*observation);
+        });
+        assert!(filter.record.len() < walk.len());
+        filter.source.clone_from(filter.beam.get(0).unwrap());
+        assert_eq!(filter.rebuild(0, filter.record.len()), Some(()));
+        let (built, held) = (filter.draft.score(), filter.source.score());
+        assert!((built - held).abs() < 0.1, "seed {seed}: {built} {held}");
+    }
+}
+
+#[test]
 fn a_decoded_path_is_the_best_one_along_known_ways() {
     let mut filter = Box::new(Small::new());
     for seed in 0..20 {
