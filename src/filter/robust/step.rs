@@ -57,6 +57,7 @@ impl<const N: usize, const V: usize, const HISTORY: usize> RobustFilter<N, V, HI
 
     /// Moves the oldest observation out of the history.
     fn marginalise_oldest(&mut self) {
+        self.fold.cancel();
         let history = &self.history;
         let mut has_decayed = false;
         self.beam.for_each(|hypothesis| has_decayed |= hypothesis.marginalise_oldest(history));
