@@ -32,6 +32,7 @@ pub mod parallel;
 mod planar;
 pub mod prior;
 pub mod range_csv;
+pub mod reliability;
 pub mod report;
 pub mod revisits;
 pub mod rotation;
