@@ -14,10 +14,11 @@
 //! | `proposals`, `merge_proposals`, `split_proposals`, `merge` | refinement: changes of a hypothesis |
 //! | `fold` | refinement: a map from the tree of the history |
 //! | `lattice`, `hmm`, `viterbi`, `forward` | paths: the best one, and all |
-//! | `publish` | what is published |
+//! | `confidence`, `publish` | what is published |
 
 pub(crate) mod beam;
 mod column;
+pub(crate) mod confidence;
 mod config;
 mod fold;
 mod forward;
@@ -53,6 +54,7 @@ use crate::map::PerVertex;
 use crate::map::{Map, VertexId};
 use crate::place::Fingerprint;
 use beam::Beam;
+use confidence::Trials;
 use fold::{Fold, Progress};
 use forward::Forward;
 use history::ObservationHistory;
@@ -104,6 +106,7 @@ pub struct RobustFilter<const N: usize, const V: usize, const HISTORY: usize> {
     viterbi: Viterbi<HISTORY>,
     forward: Forward<V>,
     pub(crate) fold: Fold<HISTORY>,
+    pub(crate) trials: Trials,
     pub(crate) vertex_ids: VertexIds<V>,
     /// The published vertex of each observation of the history.
     pub(crate) published_path: [VertexId; HISTORY],
@@ -137,6 +140,7 @@ impl<const N: usize, const V: usize, const HISTORY: usize> RobustFilter<N, V, HI
             viterbi: Viterbi::new(),
             forward: Forward::new(),
             fold: Fold::new(),
+            trials: Trials::NONE,
             vertex_ids: VertexIds::new(),
             published_path: [VertexId::FIRST; HISTORY],
             map: Map::new(),
@@ -157,6 +161,7 @@ impl<const N: usize, const V: usize, const HISTORY: usize> RobustFilter<N, V, HI
         self.draft.start_with(map, f32::from(config.noise_mm) / f32::from(Fingerprint::STEP_MM));
         self.draft.recount(&self.model, &self.history);
         self.beam.start_with(&self.draft);
+        self.trials = Trials::OF_KNOWN_MAP;
         self.vertex_ids.start_with(map.vertices().len());
         self.map = *map;
         Ok(())
@@ -166,6 +171,16 @@ impl<const N: usize, const V: usize, const HISTORY: usize> RobustFilter<N, V, HI
     pub fn refresh(&mut self) -> Update {
         self.update_bound();
         self.publish()
+    }
+
+    /// Inserts the draft into the beam, and notes if its map is the best one now.
+    fn insert_draft(&mut self) {
+        let best_key = |beam: &Beam<N, V, HISTORY>| beam.best().map(|best| best.map_alone_key());
+        let key = best_key(&self.beam);
+        self.beam.insert(&self.draft, self.config.hypotheses.into());
+        if best_key(&self.beam) != key {
+            self.trials = Trials::NONE;
+        }
     }
 
     /// How many places were observed.
@@ -205,6 +220,7 @@ impl<const N: usize, const V: usize, const HISTORY: usize> Filter<V> for RobustF
         self.map_probability_q16 = 0;
         self.faults = FaultCounters::new();
         self.fold.cancel();
+        self.trials = Trials::NONE;
         Ok(())
     }
 
@@ -262,13 +278,15 @@ impl<const N: usize, const V: usize, const HISTORY: usize> Filter<V> for RobustF
             self.draft.clone_from(hypothesis);
             self.fold.write(&self.history, &mut self.draft);
             if proposals.finish(&mut self.draft) {
-                self.beam.insert(&self.draft, wanted);
+                let key = self.draft.map_alone_key();
+                self.trials.add_fold(self.beam.best().is_some_and(|best| best.map_alone_key() == key));
+                self.insert_draft();
             }
             return;
         }
         self.draft.clone_from(hypothesis);
         if proposals.step(&mut self.draft) {
-            self.beam.insert(&self.draft, wanted);
+            self.insert_draft();
         }
     }
 

@@ -29,6 +29,7 @@ impl<const N: usize, const V: usize, const HISTORY: usize> RobustFilter<N, V, HI
         if self.localise_only {
             self.detect_kidnapping();
         } else {
+            self.trials.add_place();
             for _ in 0..self.config.moves {
                 self.refine();
             }

@@ -34,7 +34,7 @@ impl<const N: usize, const V: usize, const HISTORY: usize> RobustFilter<N, V, HI
     /// The largest snapshot of this filter alone in bytes: `N` hypotheses of `V` vertices and a full history.
     pub const SNAPSHOT_BYTES: usize = {
         let counted = V * (STATISTICS_BYTES + row_bytes(V));
-        let published = 1 + V * (11 + row_bytes(V)) + 4 + 1 + V + path_bytes(V, HISTORY);
+        let published = 1 + V * (11 + row_bytes(V)) + 4 + 4 + 1 + V + path_bytes(V, HISTORY);
         let hypothesis = hypothesis::FIXED_BYTES + path_bytes(V, HISTORY) + counted;
         FRAME_BYTES + HEAD_BYTES + 2 + 3 * HISTORY + published + 1 + hypothesis::KEPT_BYTES + counted + N * hypothesis
     };
