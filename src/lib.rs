@@ -156,10 +156,10 @@ pub mod wire;
 pub use config_error::ConfigError;
 pub use fault::{FaultCounters, FaultKind};
 pub use filter::{
-    Consistency, Direction, Evidence, Exit, Filter, FilterCapacities, History, Ngram, NgramError, NgramLength,
-    NgramTable, NgramsFull, Observation, OrderedConfig, OrderedFactors, OrderedFilter, PaperConfig, PaperFactors,
-    PaperFilter, Particle, Passage, Prior, RobustConfig, RobustFactors, RobustFilter, Update, Ways, WaysError,
-    WeightFactors, WorstNgram,
+    CERTAIN_Q16, Consistency, Direction, Evidence, Exit, Filter, FilterCapacities, History, Ngram, NgramError,
+    NgramLength, NgramTable, NgramsFull, Observation, OrderedConfig, OrderedFactors, OrderedFilter, PaperConfig,
+    PaperFactors, PaperFilter, Particle, Passage, Prior, RobustConfig, RobustFactors, RobustFilter, Update, Ways,
+    WaysError, WeightFactors, WorstNgram,
 };
 pub use map::{Bearing, DartId, DartMap, Darts, Map, PerVertex, VertexId, VertexSet, VerticesFull, WAYS_MAX};
 pub use mapper::{Mapper, MapperConfig};

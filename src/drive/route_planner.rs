@@ -11,8 +11,6 @@ use crate::place::Obstacles;
 
 /// Minimum probability of a vertex that counts as reached, in units of 2⁻¹⁶.
 const REACHED_Q16: u32 = 1 << 15;
-/// Minimum probability of a map that counts as complete, in units of 2⁻¹⁶.
-const COMPLETE_Q16: u32 = 1 << 15;
 /// Successive places with a way to drive after which a map is no longer complete.
 const INCOMPLETE_PLACES: usize = 3;
 /// An edge with fewer passages is not confirmed.
@@ -218,7 +216,7 @@ impl<const V: usize> RoutePlanner<V> {
         let (Some(darts), Some(here)) = (filter.darts(), filter.recent(0)) else { return };
         let is_due = frames_to_way::<V>(darts, |way| self.is_open(filter, darts, way) || is_unconfirmed(darts, way));
         let is_due = is_due[here].is_some();
-        let seems_complete = !is_due && filter.map_probability_q16() >= COMPLETE_Q16;
+        let seems_complete = !is_due && !filter.is_uncertain();
         if seems_complete == self.is_complete || self.is_complete && !is_due {
             self.contrary_places = 0;
             return;

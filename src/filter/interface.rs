@@ -6,6 +6,9 @@ use crate::fault::FaultCounters;
 use crate::filter::Observation;
 use crate::map::{DartId, Darts, Map, VertexId};
 
+/// A map of a lower probability is [uncertain](Filter::is_uncertain): it is more probably wrong than right.
+pub const CERTAIN_Q16: u32 = 1 << 15;
+
 /// The capacities of a filter with a configuration.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct FilterCapacities {
@@ -73,8 +76,14 @@ pub trait Filter<const V: usize>: Sized {
     /// The probability that the robot is at a vertex of the best map.
     fn vertex_probability_q16(&self, vertex: VertexId) -> u32;
 
-    /// The probability of the best map among the maps of all hypotheses.
+    /// The probability that the best map is right: its share among the maps of all hypotheses, and with the robust filter among
+    /// those that it may have missed.
     fn map_probability_q16(&self) -> u32;
+
+    /// Whether the best map is more probably wrong than right: its probability is less than [`CERTAIN_Q16`].
+    fn is_uncertain(&self) -> bool {
+        self.map_probability_q16() < CERTAIN_Q16
+    }
 
     /// The id after the last update of a vertex by its id before. A vertex that was merged into another has the id of the
     /// other; `None` for a vertex that was removed.

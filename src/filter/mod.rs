@@ -10,7 +10,7 @@ mod vertex_ids;
 mod ways;
 pub(crate) mod worst_ngram;
 
-pub use interface::{Filter, FilterCapacities};
+pub use interface::{CERTAIN_Q16, Filter, FilterCapacities};
 pub use observation::{Observation, Passage};
 pub use ordered::{OrderedConfig, OrderedFilter};
 pub use paper::{

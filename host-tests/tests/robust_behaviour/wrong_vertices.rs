@@ -80,13 +80,12 @@ fn two_merged_places_that_look_alike_are_split_within_20_places() {
 }
 
 #[test]
-fn a_part_that_was_folded_onto_another_is_unfolded_within_50_places() {
+fn a_part_that_was_folded_onto_another_is_unfolded_within_10_places() {
     let fold = |robot: &Robot, path: &[u8]| {
         let pairs =
             [(0, 4), (1, 5), (2, 6)].map(|(kept, gone)| [kept, gone].map(|place| vertex_of(robot, path, place)));
         let folded = |&at: &u8| pairs.iter().find(|[_, gone]| *gone == at).map_or(at, |[kept, _]| *kept);
         closed(path.iter().map(folded).collect())
     };
-    // It takes a lucky move, so the more of them, the fewer places: 4 moves a place take up to 150 places here.
-    is_soon(&places_until_right_again(&ring_with_a_repeated_part(), TURNS, 16, fold), 50);
+    is_soon(&places_until_right_again(&ring_with_a_repeated_part(), TURNS, 16, fold), 10);
 }

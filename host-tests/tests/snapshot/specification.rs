@@ -155,7 +155,7 @@ fn a_snapshot_of_another_version_is_refused() {
     snapshot[end..].copy_from_slice(&crc.to_le_bytes());
     let error = Snapshot::open(&snapshot).unwrap_err();
     assert_eq!(error, SnapshotError::Version { found: 1 });
-    assert_eq!(error.to_string(), "the snapshot has version 1, not 2");
+    assert_eq!(error.to_string(), "the snapshot has version 1, not 3");
 }
 
 #[test]

@@ -28,6 +28,8 @@ enum Task {
     Replay(command::replay::Arguments),
     /// Measure how often maps are exact, over random paths through known environments.
     Evaluate(command::evaluate::Arguments),
+    /// Find the n-grams that tell places with equal labels apart, on random graphs without noise.
+    Aliasing(command::aliasing::Arguments),
     /// Run a simulated robot that serves its line at a TCP port.
     Robot(command::robot::Arguments),
     /// Record the line of a robot in an MCAP file (feature `recording`).
@@ -60,6 +62,7 @@ fn main() -> anyhow::Result<()> {
         Task::Soak(arguments) => command::soak::run(&arguments),
         Task::Replay(arguments) => command::replay::run(&arguments),
         Task::Evaluate(arguments) => command::evaluate::run(&arguments),
+        Task::Aliasing(arguments) => command::aliasing::run(&arguments),
         Task::Robot(arguments) => command::robot::run(&arguments),
         Task::Record(arguments) => command::record::run(&arguments),
         Task::Play(arguments) => command::play::run(&arguments),

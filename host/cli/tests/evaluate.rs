@@ -121,6 +121,7 @@ fn check_row(row: &Value, filter: &str) {
         "paths",
         "paths_not_exhaustive",
         "places_until_exact",
+        "reliability",
         "vertices",
         "vertices_full",
     ];
@@ -136,6 +137,8 @@ fn check_row(row: &Value, filter: &str) {
         let maps = row[key].as_object().unwrap().values().map(|maps| maps.as_u64().unwrap());
         assert_eq!(maps.sum::<u64>(), 4, "{key}");
     }
+    let bins = row["reliability"]["bins"].as_array().unwrap();
+    assert_eq!((bins.len(), bins.iter().map(|bin| bin["maps"].as_u64().unwrap()).sum::<u64>()), (10, 4));
     assert!(row["consistency_mm"]["median"].as_u64().unwrap() <= row["consistency_mm"]["p90"].as_u64().unwrap());
 }
 
@@ -366,6 +369,8 @@ fn plots_show_both_filters_on_the_same_paths() {
         assert!(picture.contains("table-i, 2 paths of 12 places"));
         assert!(picture.contains("robust filter: ") && picture.contains("paper's filter: "));
     }
+    let reliability = fs::read_to_string(plots.join("reliability.svg")).unwrap();
+    assert!(reliability.contains("robust filter") && reliability.contains("paper filter"));
 }
 
 #[test]

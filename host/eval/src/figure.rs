@@ -211,6 +211,7 @@ mod tests {
             exact_interval: [0.2, 0.8],
             exact_edges: None,
             isomorphic: 0.5,
+            reliability: Default::default(),
             vertices: vertices.iter().copied().collect(),
             edge_f1: 0.9,
             location_online: 0.9,

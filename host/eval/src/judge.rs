@@ -35,6 +35,8 @@ pub struct Judgement {
     /// Whether the vertices and the edges are right, whatever the order of the ways; `None` for a map that is not judged by its
     /// ways.
     pub exact_edges: Option<bool>,
+    /// The probability of the map, as the filter states it.
+    pub map_probability: f64,
     /// How many vertices the map has.
     pub vertices: usize,
     /// The share of the places so far at which the best hypothesis of that moment was localised.
@@ -93,6 +95,7 @@ pub fn judge(trial: &Trial, settings: &Settings, start: Start) -> PathResult {
             judgements.push(Judgement {
                 score,
                 exact_edges,
+                map_probability: candidate.map_probability(),
                 vertices: map.vertices().len(),
                 localised_share: localised[check_point] as f64 / steps as f64,
                 consistency_mm: distance_mm(&map, steps),
@@ -225,6 +228,10 @@ mod tests {
             let vertex = |(step, &place)| Some(if step < self.lost_for { (place + 1) % 3 } else { place });
             let path: Vec<Option<usize>> = self.places[..self.seen].iter().enumerate().map(vertex).collect();
             path[self.seen - places..].to_vec()
+        }
+
+        fn map_probability(&self) -> f64 {
+            0.75
         }
 
         fn vertices_full(&self) -> u32 {

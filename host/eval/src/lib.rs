@@ -4,10 +4,13 @@
 //! maps it, and [`settings`] the parameters. [`judge`] evaluates one path, [`run`] evaluates all paths, and [`report`]
 //! summarises the results.
 //!
+//! [`aliasing`] finds out which n-grams tell places with equal labels apart.
+//!
 //! [`mapping`] maps ring frames on the host, from a simulation or from a [`range_csv`] recording of a real ring.
 //! [`gvg_adherence`] measures how closely a recorded robot followed the Voronoi graph, and [`laps`] compares the laps
 //! of a recording, and [`revisits`] judges it by recorded poses. [`soak`] runs a simulated robot with faults for hours.
 
+pub mod aliasing;
 pub mod ancestry;
 pub mod candidate;
 pub mod case;
@@ -29,6 +32,7 @@ pub mod parallel;
 mod planar;
 pub mod prior;
 pub mod range_csv;
+pub mod reliability;
 pub mod report;
 pub mod revisits;
 pub mod rotation;

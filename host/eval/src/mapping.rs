@@ -52,6 +52,7 @@ pub enum FilterChoice {
 trait Stages<const SONARS: usize, const V: usize> {
     fn observe(&mut self, frame: &RingFrame<SONARS>, passage: Passage) -> Option<(Place, Update)>;
     fn map(&self) -> &Map<V>;
+    fn is_uncertain(&self) -> bool;
     /// The ways of the map, if the filter knows them.
     fn darts(&self) -> Option<Darts<'_>>;
     fn faults(&self) -> FaultCounters;
@@ -69,6 +70,10 @@ impl<const SONARS: usize, const V: usize, F: Filter<V>> Stages<SONARS, V> for Wi
 
     fn map(&self) -> &Map<V> {
         self.0.map()
+    }
+
+    fn is_uncertain(&self) -> bool {
+        self.0.filter().is_uncertain()
     }
 
     fn darts(&self) -> Option<Darts<'_>> {
@@ -100,6 +105,10 @@ impl<const SONARS: usize> Stages<SONARS, VERTICES> for Paper<SONARS> {
 
     fn map(&self) -> &Map<VERTICES> {
         self.0.map()
+    }
+
+    fn is_uncertain(&self) -> bool {
+        self.0.filter().is_uncertain()
     }
 
     fn darts(&self) -> Option<Darts<'_>> {
@@ -173,7 +182,8 @@ impl<const SONARS: usize, const V: usize> Mapping<SONARS, V> {
         let (place, update) = self.stages.observe(frame, passage)?;
         let map = self.map();
         let reported = ReportedHints { passage, ways: passage.ways(&place, 0) };
-        let step = Step { place, reported, update, vertices: map.vertices().len() as u8, edges: map.edges().count() };
+        let (vertices, edges) = (map.vertices().len() as u8, map.edges().count());
+        let step = Step { place, reported, update, is_uncertain: self.stages.is_uncertain(), vertices, edges };
         self.steps.push(step);
         Some(step)
     }

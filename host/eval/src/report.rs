@@ -3,11 +3,16 @@
 use super::{
     case::Case,
     judge::{Judgement, PathResult},
+    reliability::Reliability,
     settings::{Filter, Settings},
     walk::EXHAUSTIVE_FROM_LENGTH,
 };
 use serde::Serialize;
-use std::{collections::BTreeMap, fmt, time::Duration};
+use std::{
+    collections::{BTreeMap, BTreeSet},
+    fmt,
+    time::Duration,
+};
 use toposlam::{Direction, OrderedConfig, PaperConfig, RobustConfig};
 
 /// The width of a bin of [`Row::consistency_bins`], in millimetres.
@@ -196,6 +201,8 @@ pub struct Row {
     pub exact_edges: Option<f64>,
     /// The share of maps that are isomorphic to the truth, regardless of labels.
     pub isomorphic: f64,
+    /// How many maps are exact, by the probability that the filter states.
+    pub reliability: Reliability,
     /// Number of maps for each number of vertices (the paper's Fig. 5).
     pub vertices: BTreeMap<usize, usize>,
     /// The mean over paths of [`MapScore::edge_f1`](super::score::MapScore::edge_f1).
@@ -299,6 +306,7 @@ fn row(case: &Case, settings: &Settings, results: &[PathResult], check_point: us
         exact_interval: wilson(exact, results.len()),
         exact_edges: share(|judgement| judgement.exact_edges),
         isomorphic: mean(|judgement| f64::from(u8::from(judgement.score.isomorphic))),
+        reliability: Reliability::of(judged().map(|judgement| (judgement.map_probability, judgement.score.exact))),
         vertices,
         edge_f1: mean(|judgement| judgement.score.edge_f1),
         location_online: mean(|judgement| judgement.localised_share),
@@ -311,6 +319,17 @@ fn row(case: &Case, settings: &Settings, results: &[PathResult], check_point: us
         limit: share(|judgement| judgement.leaves_truth),
         prior_seconds: prior_time.as_secs_f64() / results.len() as f64,
         seconds_per_place: filter_time.as_secs_f64() / (results.len() * length) as f64,
+    }
+}
+
+impl Report {
+    /// The reliability of each filter over all rows.
+    pub fn filters(&self) -> impl Iterator<Item = (&'static str, Reliability)> {
+        let names: BTreeSet<&'static str> = self.rows.iter().map(|row| row.filter).collect();
+        names.into_iter().map(|name| {
+            let rows = self.rows.iter().filter(|row| row.filter == name);
+            (name, Reliability::sum(rows.map(|row| &row.reliability)))
+        })
     }
 }
 
@@ -367,7 +386,15 @@ impl fmt::Display for Report {
             row.vertices.iter().try_for_each(|(vertices, maps)| write!(f, " {vertices}:{maps}"))?;
             writeln!(f)?;
         }
-        Ok(())
+        self.filters().try_for_each(|(filter, reliability)| {
+            write!(f, "{filter} filter: stated probability of the map, share exact (maps):")?;
+            for bin in reliability.bins {
+                if let Some((stated, exact)) = bin.shares() {
+                    write!(f, "  {stated:.2} {exact:.2} ({})", bin.maps)?;
+                }
+            }
+            writeln!(f, "  mean error {:.3}", reliability.error())
+        })
     }
 }
 

@@ -233,9 +233,10 @@ fn probabilities(belief: &Belief) -> String {
     let vertices = belief.vertices.as_slice().iter();
     let vertices: Vec<String> = vertices.map(|at| format!("{} {}‰", at.vertex, at.permille)).collect();
     format!(
-        "belief after place {}: this map {}‰, at vertex {}",
+        "belief after place {}: this map {}‰{}, at vertex {}",
         belief.place_index,
         belief.map_permille,
+        if belief.is_uncertain() { " (uncertain)" } else { "" },
         vertices.join(", ")
     )
 }

@@ -199,6 +199,7 @@ where
                 place: *place,
                 reported: ReportedHints { passage, ways },
                 update: *update,
+                is_uncertain: self.robot.mapper().filter().is_uncertain(),
                 vertices,
                 edges,
             });

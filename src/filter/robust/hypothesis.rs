@@ -228,6 +228,11 @@ impl<const V: usize, const T: usize> Hypothesis<V, T> {
         self.vertices = count;
     }
 
+    /// Whether there are visits or edges that are not in the history.
+    pub(crate) fn has_marginalised(&self) -> bool {
+        self.before.is_some() || self.marginalised.values().iter().any(|statistics| statistics.visits > 0)
+    }
+
     /// Whether all visits of a vertex are in the history.
     pub(crate) fn is_recent(&self, vertex: VertexId) -> bool {
         self.marginalised[vertex].visits == 0 && self.before != Some(vertex)

@@ -56,14 +56,6 @@ impl<const V: usize, const T: usize> Hypothesis<V, T> {
         gain - LN_VERTEX + f32::from(self.starts) * (ln(self.vertices) - ln(self.vertices.max(2) - 1))
     }
 
-    /// Merges two vertices in path, statistics and edges. The vertices keep their numbers.
-    pub(super) fn unite(&mut self, kept: VertexId, removed: VertexId, len: usize) {
-        self.merge(kept, removed, len);
-        self.unite_statistics(kept, removed);
-        self.statistics[removed] = VertexStatistics::NONE;
-        self.neighbours[removed] = VertexSet32::EMPTY;
-    }
-
     /// Adds statistics and edges of a vertex to those of another.
     pub(super) fn unite_statistics(&mut self, kept: VertexId, removed: VertexId) {
         let statistics = self.statistics[removed];

@@ -2,16 +2,13 @@
 
 use super::hypothesis::Hypothesis;
 use super::proposals::Proposals;
-use crate::map::{PerVertex, VertexId, VertexSet32};
+use crate::map::{VertexId, VertexSet32};
 
 /// The scale of label differences between vertices that are merged, in steps.
 const MERGE_SCALE_STEPS: f32 = 75.0;
 
 /// The temperature of the draw among merges by their gain.
 const MERGE_TEMPERATURE: f32 = 2.0;
-
-/// The longest stretch that is unfolded is one place longer.
-const STRETCH: usize = 16;
 
 impl<const V: usize, const T: usize> Proposals<'_, V, T> {
     /// Merges two vertices that are not neighbours, drawn by [`Hypothesis::merge_gain`]: the highest gain after Gumbel noise.
@@ -32,57 +29,6 @@ impl<const V: usize, const T: usize> Proposals<'_, V, T> {
         }
         let Some((kept, removed)) = best else { return false };
         hypothesis.merge(kept, removed, self.history.len());
-        true
-    }
-
-    /// Undoes the folding of one part of a building onto another, which no single split does: gives a stretch of the path
-    /// vertices of its own, then merges each with the vertex of the highest gain while there is a gain, but the first one not
-    /// with the vertex it was.
-    pub(super) fn unfold(&mut self, hypothesis: &mut Hypothesis<V, T>) -> bool {
-        let len = self.history.len();
-        let length = 2 + self.below(STRETCH);
-        let first = self.below(len);
-        let mut own = PerVertex::<Option<VertexId>, V>::filled(None);
-        let old = hypothesis.vertices;
-        let pivot = hypothesis.vertex_of(first);
-        for (index, observation) in self.history.iter().enumerate().skip(first).take(length) {
-            if observation.starts_sequence() && index > first {
-                break;
-            }
-            let Some(vertex) = hypothesis.vertex_of(index) else { break };
-            if own[vertex].is_none() {
-                let Some(next) = hypothesis.next_vertex() else { break };
-                own[vertex] = Some(next);
-                hypothesis.vertices += 1;
-            }
-            hypothesis.set_vertex_of(index, own[vertex].unwrap_or(vertex));
-        }
-        if hypothesis.vertices == old {
-            return false;
-        }
-        hypothesis.recount(self.model, self.history);
-        let own_pivot = pivot.and_then(|pivot| own[pivot]);
-        loop {
-            let mut best = None;
-            let mut highest = 0.0;
-            for removed in hypothesis.vertices().skip(old.into()) {
-                if hypothesis.statistics[removed].visits == 0 {
-                    continue;
-                }
-                for kept in VertexId::first(removed.index()) {
-                    let is_pivot = Some(kept) == pivot && Some(removed) == own_pivot;
-                    if is_pivot || hypothesis.statistics[kept].visits == 0 {
-                        continue;
-                    }
-                    let gain = hypothesis.merge_gain(self.model, kept, removed);
-                    if gain > highest {
-                        (highest, best) = (gain, Some((kept, removed)));
-                    }
-                }
-            }
-            let Some((kept, removed)) = best else { break };
-            hypothesis.unite(kept, removed, len);
-        }
         true
     }
 

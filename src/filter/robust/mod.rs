@@ -3,21 +3,24 @@
 //! A hypothesis is the vertex of each observation; map and statistics follow from it. Its evidence integrates out the mean and
 //! the variance of each label, and takes each transition as a uniform choice among the exits of its vertex, so that a new edge
 //! rescales the likelihood of all past transitions. A share of the bound of the map's other paths counts too. Each observation
-//! extends all hypotheses, and the best distinct ones stay. Between observations, proposals merge, split, unfold and decode them:
-//! nothing else revises an earlier decision.
+//! extends all hypotheses, and the best distinct ones stay. Between observations, proposals merge, split and decode them, and folds
+//! build maps from the history: nothing else revises an earlier decision.
 //!
 //! | File | |
 //! |---|---|
 //! | `history`, `statistics`, `hypothesis`, `marginalisation` | the state |
 //! | `model`, `special_functions`, `noise` | the generative model |
 //! | `step`, `growth`, `beam` | one more observation |
-//! | `proposals`, `merge_proposals`, `split_proposals`, `merge` | refinement |
+//! | `proposals`, `merge_proposals`, `split_proposals`, `merge` | refinement: changes of a hypothesis |
+//! | `fold` | refinement: a map from the tree of the history |
 //! | `lattice`, `hmm`, `viterbi`, `forward` | paths: the best one, and all |
-//! | `publish` | what is published |
+//! | `confidence`, `publish` | what is published |
 
 pub(crate) mod beam;
 mod column;
+pub(crate) mod confidence;
 mod config;
+mod fold;
 mod forward;
 mod growth;
 pub(crate) mod history;
@@ -51,6 +54,8 @@ use crate::map::PerVertex;
 use crate::map::{Map, VertexId};
 use crate::place::Fingerprint;
 use beam::Beam;
+use confidence::Trials;
+use fold::{Fold, Progress};
 use forward::Forward;
 use history::ObservationHistory;
 use hmm::Hmm;
@@ -60,11 +65,14 @@ use model::Model;
 use proposals::Proposals;
 use viterbi::Viterbi;
 
+/// One of this many refinement steps belongs to a fold, on average.
+const FOLD_EVERY: usize = 3;
+
 /// The robust filter with at most `N` hypotheses, maps of at most `V` vertices (2 to 32), and a history of the newest `HISTORY`
 /// places. Proposals can revise what the history contains; what is older is marginalised.
 ///
 /// The filter is const-constructed to zero, so that a `static` of it is in `.bss`, and initialised in place by
-/// [`Filter::start`]. Memory: about `(N + 1) · (HISTORY + 48 · V + 32) + 20 · HISTORY + 60 · V + 800` bytes.
+/// [`Filter::start`]. Memory: about `(N + 1) · (HISTORY + 48 · V + 32) + 21 · HISTORY + 60 · V + 6000` bytes.
 /// The same observations, seed and calls of [`Filter::refine`] give the same result on every target.
 ///
 /// ```
@@ -97,6 +105,8 @@ pub struct RobustFilter<const N: usize, const V: usize, const HISTORY: usize> {
     lattice: Lattice,
     viterbi: Viterbi<HISTORY>,
     forward: Forward<V>,
+    pub(crate) fold: Fold<HISTORY>,
+    pub(crate) trials: Trials,
     pub(crate) vertex_ids: VertexIds<V>,
     /// The published vertex of each observation of the history.
     pub(crate) published_path: [VertexId; HISTORY],
@@ -129,6 +139,8 @@ impl<const N: usize, const V: usize, const HISTORY: usize> RobustFilter<N, V, HI
             lattice: Lattice::new(),
             viterbi: Viterbi::new(),
             forward: Forward::new(),
+            fold: Fold::new(),
+            trials: Trials::NONE,
             vertex_ids: VertexIds::new(),
             published_path: [VertexId::FIRST; HISTORY],
             map: Map::new(),
@@ -149,6 +161,7 @@ impl<const N: usize, const V: usize, const HISTORY: usize> RobustFilter<N, V, HI
         self.draft.start_with(map, f32::from(config.noise_mm) / f32::from(Fingerprint::STEP_MM));
         self.draft.recount(&self.model, &self.history);
         self.beam.start_with(&self.draft);
+        self.trials = Trials::OF_KNOWN_MAP;
         self.vertex_ids.start_with(map.vertices().len());
         self.map = *map;
         Ok(())
@@ -158,6 +171,16 @@ impl<const N: usize, const V: usize, const HISTORY: usize> RobustFilter<N, V, HI
     pub fn refresh(&mut self) -> Update {
         self.update_bound();
         self.publish()
+    }
+
+    /// Inserts the draft into the beam, and notes if its map is the best one now.
+    fn insert_draft(&mut self) {
+        let best_key = |beam: &Beam<N, V, HISTORY>| beam.best().map(|best| best.map_alone_key());
+        let key = best_key(&self.beam);
+        self.beam.insert(&self.draft, self.config.hypotheses.into());
+        if best_key(&self.beam) != key {
+            self.trials = Trials::NONE;
+        }
     }
 
     /// How many places were observed.
@@ -196,6 +219,8 @@ impl<const N: usize, const V: usize, const HISTORY: usize> Filter<V> for RobustF
         self.belief_q16.fill(0);
         self.map_probability_q16 = 0;
         self.faults = FaultCounters::new();
+        self.fold.cancel();
+        self.trials = Trials::NONE;
         Ok(())
     }
 
@@ -218,7 +243,7 @@ impl<const N: usize, const V: usize, const HISTORY: usize> Filter<V> for RobustF
         self.step(observation.into())
     }
 
-    /// Makes one proposal. Cost: at most seven passes over the history.
+    /// Makes one proposal, or a step of a fold. Cost: at most seven passes over the history, or 1500 merges of two nodes.
     fn refine(&mut self) {
         if self.localise_only || self.history.len() < 3 {
             return;
@@ -243,9 +268,25 @@ impl<const N: usize, const V: usize, const HISTORY: usize> Filter<V> for RobustF
         };
         self.refinements = self.refinements.wrapping_add(1);
         let Some(hypothesis) = self.beam.get(rank) else { return };
+        if proposals.below(FOLD_EVERY) == 0 && !hypothesis.has_marginalised() {
+            if !self.fold.is_running() {
+                self.fold.start(&self.model, &self.history, hypothesis, proposals.random);
+            }
+            if self.fold.step(&self.model, &self.history, V, proposals.random) != Progress::Done {
+                return;
+            }
+            self.draft.clone_from(hypothesis);
+            self.fold.write(&self.history, &mut self.draft);
+            if proposals.finish(&mut self.draft) {
+                let key = self.draft.map_alone_key();
+                self.trials.add_fold(self.beam.best().is_some_and(|best| best.map_alone_key() == key));
+                self.insert_draft();
+            }
+            return;
+        }
         self.draft.clone_from(hypothesis);
         if proposals.step(&mut self.draft) {
-            self.beam.insert(&self.draft, wanted);
+            self.insert_draft();
         }
     }
 
@@ -293,6 +334,7 @@ impl<const N: usize, const V: usize, const HISTORY: usize> Filter<V> for RobustF
             self.refresh();
         }
         self.localise_only = localise_only;
+        self.fold.cancel();
         self.beam.keep_best();
         if !localise_only && let Some(best) = self.beam.best_mut() {
             best.recount(&self.model, &self.history);

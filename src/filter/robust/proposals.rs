@@ -56,17 +56,18 @@ impl<const V: usize, const T: usize> Proposals<'_, V, T> {
             0 | 1 if vertices > 2 => self.merge_by_evidence(hypothesis),
             2 if vertices > 2 => self.merge_by_label(hypothesis),
             3 if vertices > 2 => self.delete(hypothesis),
-            4 | 5 | 9 if vertices < V => self.split_by_neighbours(hypothesis),
+            4 | 5 | 7..=9 if vertices < V => self.split_by_neighbours(hypothesis),
             6 if vertices < V => self.split_by_label(hypothesis),
-            7 | 8 if vertices < V => self.unfold(hypothesis),
             _ => {
                 self.decode(hypothesis, VertexSet32::ALL, true);
                 true
             }
         };
-        if !changed {
-            return false;
-        }
+        changed && self.finish(hypothesis)
+    }
+
+    /// Follows from a path that was changed, and decodes it. Returns whether the result is to be kept if its score is high enough.
+    pub(super) fn finish(&mut self, hypothesis: &mut Hypothesis<V, T>) -> bool {
         // The bound of the other paths stays until it is updated.
         hypothesis.rebuild(self.model, self.history);
         for _ in 0..DECODINGS {

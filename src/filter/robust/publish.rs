@@ -1,6 +1,6 @@
 //! What the filter publishes after a place: the best map with its vertex ids, the belief, and the probability of the map.
 
-use super::RobustFilter;
+use super::{RobustFilter, confidence};
 use crate::filter::beam::Ranked as _;
 use crate::filter::worst_ngram::worst_ngram;
 use crate::filter::{RobustFactors, Update, WeightFactors, WorstNgram};
@@ -49,19 +49,17 @@ impl<const N: usize, const V: usize, const HISTORY: usize> RobustFilter<N, V, HI
             self.belief_q16[ids[vertex]] = (self.forward.belief[vertex] * ONE_Q16) as u32;
         }
         self.worst = self.find_worst_ngram();
-        let (mut same, mut all) = (0.0, 0.0);
-        let mut rival = f32::NEG_INFINITY;
-        for hypothesis in self.beam.iter() {
-            let behind = hypothesis.score() - best.score();
-            let weight = libm::expf(behind.min(0.0));
-            all += weight;
-            if hypothesis.map_alone_key() == best.map_alone_key() {
-                same += weight;
-            } else {
-                rival = rival.max(behind);
-            }
-        }
-        self.map_probability_q16 = (same / all * ONE_Q16) as u32;
+        let score = best.score();
+        let rivals = self.beam.iter().filter(|held| held.map_alone_key() != best.map_alone_key());
+        let rival = rivals.map(|rival| rival.score() - score).fold(f32::NEG_INFINITY, f32::max);
+        // While the filter only localises, the map is known.
+        let probability = if self.localise_only {
+            1.0
+        } else {
+            let excess = f32::from(self.worst.distance_mm) / (EXPLAINED_DEVIATIONS * self.noise_mm());
+            confidence::probability(&self.beam, self.config.hypotheses.into(), self.trials, excess)
+        };
+        self.map_probability_q16 = ((probability * ONE_Q16) as u32).max(1);
         let [labels, transitions, size] = best.factors(&self.model);
         Update {
             place_index: self.observed.wrapping_sub(1),

@@ -29,6 +29,7 @@ impl<const N: usize, const V: usize, const HISTORY: usize> RobustFilter<N, V, HI
         if self.localise_only {
             self.detect_kidnapping();
         } else {
+            self.trials.add_place();
             for _ in 0..self.config.moves {
                 self.refine();
             }
@@ -57,6 +58,7 @@ impl<const N: usize, const V: usize, const HISTORY: usize> RobustFilter<N, V, HI
 
     /// Moves the oldest observation out of the history.
     fn marginalise_oldest(&mut self) {
+        self.fold.cancel();
         let history = &self.history;
         let mut has_decayed = false;
         self.beam.for_each(|hypothesis| has_decayed |= hypothesis.marginalise_oldest(history));

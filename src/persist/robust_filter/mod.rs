@@ -1,7 +1,8 @@
 //! The robust filter in a snapshot: the state that cannot be recomputed from the places and the paths.
 //!
 //! A snapshot holds the path and the marginalised statistics of each hypothesis; map, statistics and evidence are
-//! recomputed. Saving recomputes them in the running filter too, so that it equals a restored one bit for bit.
+//! recomputed. Saving recomputes them in the running filter too and ends a fold under way, so that it equals a restored one bit for
+//! bit.
 
 mod hypothesis;
 mod parts;
@@ -33,7 +34,7 @@ impl<const N: usize, const V: usize, const HISTORY: usize> RobustFilter<N, V, HI
     /// The largest snapshot of this filter alone in bytes: `N` hypotheses of `V` vertices and a full history.
     pub const SNAPSHOT_BYTES: usize = {
         let counted = V * (STATISTICS_BYTES + row_bytes(V));
-        let published = 1 + V * (11 + row_bytes(V)) + 4 + 1 + V + path_bytes(V, HISTORY);
+        let published = 1 + V * (11 + row_bytes(V)) + 4 + 4 + 1 + V + path_bytes(V, HISTORY);
         let hypothesis = hypothesis::FIXED_BYTES + path_bytes(V, HISTORY) + counted;
         FRAME_BYTES + HEAD_BYTES + 2 + 3 * HISTORY + published + 1 + hypothesis::KEPT_BYTES + counted + N * hypothesis
     };
@@ -129,6 +130,7 @@ impl<const N: usize, const V: usize, const HISTORY: usize> RobustFilter<N, V, HI
 
     /// Brings the filter into the state that its own snapshot restores.
     fn make_canonical(&mut self) {
+        self.fold.cancel();
         if self.localise_only {
             // The map is fixed, so every hypothesis has the map of the best one.
             if let Some(best) = self.beam.best() {
@@ -163,6 +165,7 @@ impl<const N: usize, const V: usize, const HISTORY: usize> RobustFilter<N, V, HI
         self.model.configure(&head.config);
         self.model.set_scale(head.scale);
         self.beam.start_empty();
+        self.fold.cancel();
         self.faults = FaultCounters::new();
     }
 }

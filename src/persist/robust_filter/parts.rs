@@ -1,6 +1,7 @@
 //! The parts of a snapshot: observations, statistics, edges, paths, and the last published result.
 
 use crate::filter::RobustFilter;
+use crate::filter::robust::confidence::Trials;
 use crate::filter::robust::history::{ObservationHistory, PackedObservation};
 use crate::filter::robust::statistics::{DECAY_VISITS, VertexStatistics};
 use crate::map::{Map, VertexId};
@@ -165,6 +166,10 @@ impl<const N: usize, const V: usize, const HISTORY: usize> RobustFilter<N, V, HI
             writer.u32(self.belief_q16[vertex])?;
         }
         writer.u32(self.map_probability_q16)?;
+        let Trials { places, found, missed } = self.trials;
+        writer.u16(places)?;
+        writer.u8(found)?;
+        writer.u8(missed)?;
         let ids = &self.vertex_ids;
         writer.u8(ids.vertices_before)?;
         for before in VertexId::first(ids.vertices_before.into()) {
@@ -198,6 +203,7 @@ impl<const N: usize, const V: usize, const HISTORY: usize> RobustFilter<N, V, HI
         }
         check_symmetry(&neighbours)?;
         let map_probability = from.u32()?;
+        let trials = Trials { places: from.u16()?, found: from.u8()?, missed: from.u8()? };
         let vertices_before = from.u8()?;
         let remapped = from.bytes(vertices_before.into())?;
         let is_id = |&id: &u8| id == NOWHERE || usize::from(id) < V;
@@ -227,6 +233,7 @@ impl<const N: usize, const V: usize, const HISTORY: usize> RobustFilter<N, V, HI
             }
             self.belief_q16 = belief_q16;
             self.map_probability_q16 = map_probability;
+            self.trials = trials;
         }
         Ok(vertices)
     }

@@ -35,7 +35,7 @@ use crate::checksum::CRC;
 use core::fmt;
 
 /// The version of the layout. A snapshot of another version is refused.
-pub const SNAPSHOT_VERSION: u16 = 2;
+pub const SNAPSHOT_VERSION: u16 = 3;
 
 /// The tag of the filter's section.
 pub const FILTER_SECTION: u8 = 1;

@@ -4,7 +4,7 @@ use serde::{Deserialize, Serialize};
 
 use super::List;
 use super::message::bit;
-use crate::filter::Filter;
+use crate::filter::{CERTAIN_Q16, Filter};
 use crate::map::{VertexId, VertexSet};
 
 /// The belief of the filter after a place: where the robot may be, and how probable the map is.
@@ -12,7 +12,7 @@ use crate::map::{VertexId, VertexSet};
 pub struct Belief {
     /// The number of the place since the start, from 0.
     pub place_index: u32,
-    /// The probability of the map among the maps of all hypotheses, in thousandths.
+    /// The probability that the map is right, in thousandths.
     pub map_permille: u16,
     /// The most probable vertices, the most probable first. The rest up to 1000 belongs to other vertices.
     pub vertices: List<VertexProbability, 8>,
@@ -43,6 +43,11 @@ impl Belief {
         }
         let vertices = List::new(most_probable.into_iter().take_while(|candidate| candidate.permille > 0));
         Self { place_index, map_permille: permille(filter.map_probability_q16()), vertices }
+    }
+
+    /// Whether the map is uncertain, as [`Filter::is_uncertain`].
+    pub fn is_uncertain(&self) -> bool {
+        self.map_permille < permille(CERTAIN_Q16)
     }
 
     /// Applies new vertex ids: removed vertices are left out, the probabilities of merged ones are added.
@@ -180,5 +185,17 @@ impl Worst {
         let walk = self.vertices.as_slice();
         let vertices = List::new(walk.iter().filter_map(|&vertex| remapped.now(vertex)));
         (vertices.as_slice().len() == walk.len()).then_some(Self { vertices, ..self })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_map_that_is_more_probably_wrong_than_right_is_uncertain() {
+        let belief = |map_permille| Belief { place_index: 0, map_permille, vertices: List::new([]) };
+        assert!([0, 499].into_iter().all(|permille| belief(permille).is_uncertain()));
+        assert!(![500, 1000].into_iter().any(|permille| belief(permille).is_uncertain()));
     }
 }

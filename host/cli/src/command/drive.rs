@@ -78,12 +78,13 @@ impl DriveArguments {
 
     /// Prints the detected places and the scores of the map, and writes the SVG file if `--svg` is given.
     pub(super) fn summarise<const V: usize>(&self, drive: &Summary<'_, V>) -> anyhow::Result<()> {
-        let Summary { plan, truth, ground_truth, map, darts, path, faults, .. } = drive;
+        let Summary { plan, truth, ground_truth, map, darts, is_uncertain, path, faults, .. } = drive;
         let detections = ground_truth.detections();
         println!("\n{}: {} places in {} visits", self.plan, detections.len(), ground_truth.visits());
         println!("{}", ground_truth.report());
         let (vertices, edges) = (map.vertices().len(), map.edges().count());
-        println!("map: {vertices} vertices, {edges} edges, digest {:08x}", map_digest(map, *darts));
+        let uncertain = if *is_uncertain { ", uncertain" } else { "" };
+        println!("map: {vertices} vertices, {edges} edges, digest {:08x}{uncertain}", map_digest(map, *darts));
         if let Some(darts) = darts {
             println!("frontiers: {}", darts.frontiers().count());
         }
@@ -106,6 +107,8 @@ pub(super) struct Summary<'a, const V: usize> {
     pub(super) map: &'a Map<V>,
     /// The ways of the map, if the filter knows them.
     pub(super) darts: Option<Darts<'a>>,
+    /// Whether the filter holds the map for uncertain.
+    pub(super) is_uncertain: bool,
     /// Whether the drive holds the map for complete.
     pub(super) is_complete: bool,
     pub(super) path: Vec<Option<usize>>,
@@ -124,6 +127,7 @@ impl<'a, const V: usize> Summary<'a, V> {
             ground_truth: exploration.ground_truth(),
             map: exploration.robot().mapper().map(),
             darts: exploration.robot().mapper().filter().darts(),
+            is_uncertain: exploration.robot().mapper().filter().is_uncertain(),
             is_complete: exploration.robot().drive().is_complete(),
             path: exploration.path(),
             faults: exploration.faults(),

@@ -2,6 +2,7 @@
 //! `emulate`, `filter` the choice of a filter, `hardship` the emulation with faults, `interrupt` Ctrl-C, `machine` the
 //! emulated machine, `ring_recording` the ring frames of an MCAP file.
 
+pub(crate) mod aliasing;
 pub(crate) mod console;
 mod drive;
 pub(crate) mod emulate;

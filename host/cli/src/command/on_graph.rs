@@ -76,6 +76,7 @@ fn map<const V: usize>(
         ground_truth: &ground_truth,
         map: mapping.map(),
         darts: mapping.darts(),
+        is_uncertain: mapping.steps().last().is_some_and(|step| step.is_uncertain),
         is_complete: false,
         path: mapping.path(),
         faults: mapping.faults(),

@@ -75,7 +75,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     if let Some(lap_frames) = arguments.lap_frames {
         println!("\n{}\n", Laps::compare(&visits, lap_frames, frames.len() as u32, Tolerance::of(lap_frames)));
     }
-    print_map(mapping.map());
+    print_map(mapping.map(), mapping.steps().last().is_some_and(|step| step.is_uncertain));
     for line in fault_lines(&mapping.faults()) {
         println!("fault {line}");
     }
@@ -107,9 +107,10 @@ fn load_robot_recording(_: &Path, _: Option<Ring>) -> anyhow::Result<(Ring, Reco
     Err(super::missing::no_recordings())
 }
 
-fn print_map<const V: usize>(map: &Map<V>) {
+fn print_map<const V: usize>(map: &Map<V>, is_uncertain: bool) {
     let edges: Vec<_> = map.edges().collect();
-    println!("map: {} vertices, {} edges", map.vertices().len(), edges.len());
+    let uncertain = if is_uncertain { ", uncertain" } else { "" };
+    println!("map: {} vertices, {} edges{uncertain}", map.vertices().len(), edges.len());
     for (vertex, label) in map.vertices().zip(map.labels()) {
         println!("  vertex {vertex:2}: radius {:4} mm, {} visits", label.radius_mm(), map.visits(vertex));
     }

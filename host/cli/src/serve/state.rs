@@ -87,6 +87,7 @@ fn map(watch: &Watch) -> Value {
         "converged": replica.is_converged(),
         "location": replica.location(),
         "belief": replica.belief(),
+        "is_uncertain": replica.belief().map(|belief| belief.is_uncertain()),
         "evidence": evidence.map(|evidence| json!({
             "place_index": evidence.place_index,
             "consistency_mm": finite_mm(evidence.consistency_mm),

@@ -40,8 +40,15 @@ pub trait Candidate {
     }
     /// The vertex of each of the newest `places` places in the best map, the oldest first; `None` where it is not known.
     fn path(&self, places: usize) -> Vec<Option<usize>>;
+    /// The probability of the best map, as the filter states it.
+    fn map_probability(&self) -> f64;
     /// Number of times that the filter needed a new vertex and its map was full.
     fn vertices_full(&self) -> u32;
+}
+
+/// A probability in units of 2⁻¹⁶.
+fn probability(q16: u32) -> f64 {
+    f64::from(q16) / 65536.0
 }
 
 /// A map with room for more vertices.

@@ -1,6 +1,6 @@
 //! The ordered filter as a candidate, with the capacities of the reference robot or of the small one.
 
-use super::{Candidate, VERTICES, widened};
+use super::{Candidate, VERTICES, probability, widened};
 use crate::{
     rotation::{RotationSystem, partner},
     settings::{Capacities, Filter, Settings},
@@ -84,6 +84,10 @@ impl<const N: usize, const V: usize, const D: usize, const T: usize> Candidate f
     fn path(&self, places: usize) -> Vec<Option<usize>> {
         let newest = &self.path[self.path.len().saturating_sub(places)..];
         newest.iter().map(|vertex| vertex.map(VertexId::index)).collect()
+    }
+
+    fn map_probability(&self) -> f64 {
+        probability(self.filter.map_probability_q16())
     }
 
     fn vertices_full(&self) -> u32 {

@@ -1,6 +1,6 @@
 //! The paper's filter as a candidate, with the n-grams of its own history or of a prior.
 
-use super::{Candidate, MAX_HYPOTHESES, Start, VERTICES};
+use super::{Candidate, MAX_HYPOTHESES, Start, VERTICES, probability};
 use crate::{
     ancestry::Ancestry,
     prior::{PriorSource, path_prior, table_prior},
@@ -84,6 +84,10 @@ impl<const WORDS: usize> Candidate for Online<WORDS> {
         self.0.path(places)
     }
 
+    fn map_probability(&self) -> f64 {
+        probability(self.0.filter.map_probability_q16())
+    }
+
     fn vertices_full(&self) -> u32 {
         self.0.filter.faults().count(FaultKind::VerticesFull)
     }
@@ -115,6 +119,10 @@ impl<const WORDS: usize> Candidate for Informed<WORDS> {
 
     fn path(&self, places: usize) -> Vec<Option<usize>> {
         self.particles.path(places)
+    }
+
+    fn map_probability(&self) -> f64 {
+        probability(self.particles.filter.map_probability_q16())
     }
 
     fn vertices_full(&self) -> u32 {

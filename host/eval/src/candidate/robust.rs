@@ -1,6 +1,6 @@
 //! The robust filter as a candidate.
 
-use super::{Candidate, MAX_HYPOTHESES, Start, VERTICES, widened};
+use super::{Candidate, MAX_HYPOTHESES, Start, VERTICES, probability, widened};
 use crate::{
     settings::{EvaluationError, Filter, Settings},
     trial::{Trial, Truth},
@@ -72,6 +72,10 @@ impl<const N: usize, const HISTORY: usize> Candidate for Robust<N, HISTORY> {
     fn path(&self, places: usize) -> Vec<Option<usize>> {
         let path: Vec<Option<usize>> = self.0.path().map(|vertex| Some(vertex.index())).collect();
         path[path.len().saturating_sub(places)..].to_vec()
+    }
+
+    fn map_probability(&self) -> f64 {
+        probability(self.0.map_probability_q16())
     }
 
     fn vertices_full(&self) -> u32 {

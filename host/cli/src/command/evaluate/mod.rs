@@ -22,6 +22,7 @@ use toposlam_eval::{
     figure::{Pair, Quantity, draw},
     hints::Hints,
     prior::PriorSource,
+    reliability,
     report::{Report, Row, SettingsReport},
     run::evaluate,
     settings::{Capacities, Filter, Settings},
@@ -40,8 +41,8 @@ pub(crate) struct Arguments {
     /// Write the observations and the ground truth of each path to files in this directory.
     #[arg(long, value_name = "DIR")]
     export: Option<PathBuf>,
-    /// Run the default filter and the paper's on the same paths, and write the paper's Fig. 4 and 5 as fig4.svg and fig5.svg to this
-    /// directory.
+    /// Run the default filter and the paper's on the same paths, and write the paper's Fig. 4 and 5 as fig4.svg and fig5.svg, and the
+    /// reliability of the probability of a map as reliability.svg, to this directory.
     #[arg(long, value_name = "DIR", conflicts_with = "filter")]
     plot: Option<PathBuf>,
     /// Output format.
@@ -159,7 +160,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
         }
     }
     if let Some(directory) = &arguments.plot {
-        plot(directory, &cases, &report.rows, &filters, settings.longest()).context("--plot")?;
+        plot(directory, &cases, &report, &filters, settings.longest()).context("--plot")?;
     }
     match arguments.format {
         Format::Json => println!("{}", serde_json::to_string(&report)?),
@@ -186,10 +187,10 @@ fn evaluate_with_progress(case: &Case, settings: &Settings) -> anyhow::Result<Ve
 }
 
 /// Plots two filters side by side at the last check point.
-fn plot(directory: &Path, cases: &[Case], rows: &[Row], filters: &[Filter], length: usize) -> anyhow::Result<()> {
+fn plot(directory: &Path, cases: &[Case], report: &Report, filters: &[Filter], length: usize) -> anyhow::Result<()> {
     let judged = |filter: &Filter| {
         let name = filter.name();
-        rows.iter().filter(move |row| row.filter == name && row.length == length)
+        report.rows.iter().filter(move |row| row.filter == name && row.length == length)
     };
     let [first, second] = filters else { return Ok(()) };
     let pairs: Vec<Pair> = cases
@@ -206,7 +207,9 @@ fn plot(directory: &Path, cases: &[Case], rows: &[Row], filters: &[Filter], leng
         let file = directory.join(name);
         fs::write(&file, draw(quantity, &pairs)).with_context(|| file.display().to_string())?;
     }
-    Ok(())
+    let file = directory.join("reliability.svg");
+    let diagrams: Vec<_> = report.filters().collect();
+    fs::write(&file, reliability::draw(&diagrams)).with_context(|| file.display().to_string())
 }
 
 impl CaseArguments {

@@ -24,7 +24,8 @@ pub(super) fn draw(frame: &mut Frame<'_>, area: Rect, model: &Model) {
             belief.vertices.as_slice().iter().map(|at| format!("{} {}‰", at.vertex, at.permille)).collect();
         lines.push(Line::from(format!("probably at {}", vertices.join(", "))));
         let rivals = 1000_u16.saturating_sub(belief.map_permille);
-        lines.push(Line::from(format!("this map {}‰, its rivals {rivals}‰", belief.map_permille)));
+        let this = if belief.is_uncertain() { "uncertain" } else { "this map" };
+        lines.push(Line::from(format!("{this} {}‰, its rivals {rivals}‰", belief.map_permille)));
     }
     if let Some(evidence) = replica.evidence() {
         lines.push(Line::from(format!("consistency {}", distance(evidence.consistency_mm))));
