@@ -36,7 +36,13 @@ impl<const N: usize, const V: usize, const D: usize, const T: usize> OrderedFilt
         if self.is_localise_only() {
             self.vertex_ids.keep(vertices.into());
         } else {
-            self.vertex_ids.update::<T>(&self.map, vertices.into(), observations, label);
+            self.vertex_ids.update::<T>(
+                &self.map,
+                vertices.into(),
+                self.base.map.vertices().into(),
+                observations,
+                label,
+            );
         }
         let ids = &self.vertex_ids.ids;
         self.map.clear();

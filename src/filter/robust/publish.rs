@@ -28,7 +28,7 @@ impl<const N: usize, const V: usize, const HISTORY: usize> RobustFilter<N, V, HI
             let published = self.history.len().saturating_sub(1);
             let observations = self.published_path.iter().copied().zip(best.path).take(published);
             let label = |vertex| Some(&best.statistics[vertex]).filter(|held| held.visits >= 2).map(|held| held.mean);
-            self.vertex_ids.update::<HISTORY>(&self.map, best.vertices.into(), observations, label);
+            self.vertex_ids.update::<HISTORY>(&self.map, best.vertices.into(), 0, observations, label);
         }
         let ids = &self.vertex_ids.ids;
         for (published, &vertex) in self.published_path.iter_mut().zip(&best.path).take(self.history.len()) {
