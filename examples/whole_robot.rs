@@ -10,7 +10,7 @@ use std::error::Error;
 use toposlam::FaultCounters;
 use toposlam::drive::{GoalStatus, VelocityCommand};
 use toposlam::reference::{ROBOT, ReferenceRobot, SNAPSHOT_BYTES};
-use toposlam::robot::{Board, SaveError};
+use toposlam::robot::Board;
 use toposlam::wire::{Command, Encoder, MAX_FRAME_BYTES, QueueFull, Request};
 use toposlam_sim::world::{BodyModel, Plan, RobotModel, Rover};
 
@@ -40,18 +40,8 @@ impl Board for SimulatedBoard {
         self.velocity = velocity;
     }
 
-    fn feed_watchdog(&mut self) {}
-
     fn now_ms(&mut self) -> u32 {
         self.now_ms
-    }
-
-    fn stack_high_water_bytes(&mut self) -> u32 {
-        0
-    }
-
-    fn save(&mut self, _snapshot: &[u8]) -> Result<(), SaveError> {
-        Err(SaveError::NoStore)
     }
 }
 

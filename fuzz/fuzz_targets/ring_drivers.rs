@@ -15,7 +15,7 @@ use arbitrary::Arbitrary;
 use bridge::{Call, bridge};
 use fakes::{Answers, Budget};
 use libfuzzer_sys::fuzz_target;
-use rings::{HcSr04, MaxBotix, Srf08, hc_sr04, max_botix, srf08};
+use rings::{HcSr04, MaxBotix, Srf08, Vl53l1x, hc_sr04, max_botix, srf08, vl53l1x};
 use toposlam::ring::drivers::{Sc18im700, change_maxbotix_address, change_srf08_address};
 
 #[derive(Arbitrary, Debug)]
@@ -28,6 +28,7 @@ enum Input<'a> {
     MaxBotixOnBridge { config: MaxBotix<'a>, budget: u8, answers: &'a [u8] },
     Srf08Address { from: u8, to: u8, answers: &'a [u8] },
     MaxBotixAddress { from: u8, to: u8, answers: &'a [u8] },
+    Vl53l1x { config: Vl53l1x<'a>, pins: &'a [u8], answers: &'a [u8] },
 }
 
 fuzz_target!(|input: Input<'_>| match input {
@@ -56,5 +57,9 @@ fuzz_target!(|input: Input<'_>| match input {
     Input::MaxBotixAddress { from, to, answers } => {
         let is_address = |address| (0x08..=0x7F).contains(&address) && ![0x28, 0x52, 0x55].contains(&address);
         address(from, to, answers, 1, is_address, |bus, delay| change_maxbotix_address(bus, delay, from, to));
+    }
+    Input::Vl53l1x { config, pins, answers } => {
+        let budget = Budget::new(u32::MAX);
+        vl53l1x(&config, Answers::new(answers, &budget), pins);
     }
 });

@@ -7,6 +7,6 @@ pub mod drivers;
 mod frame;
 mod geometry;
 
-pub use frame::{Echo, RingFrame};
+pub use frame::{Echo, RingFrame, ScanPoint};
 pub(crate) use geometry::MAX_SONARS;
 pub use geometry::RingGeometry;

@@ -6,6 +6,8 @@ use crate::drive::VelocityCommand;
 use crate::wire::QueueFull;
 
 /// The serial line, wheels, clock, watchdog and flash of a board. No method may wait for the other end of a line.
+///
+/// The methods with a default are for what a board may lack: a watchdog, a painted stack, a store.
 pub trait Board {
     /// Returns the next byte that the serial line has received; `None` if there is none.
     fn receive(&mut self) -> Option<u8>;
@@ -19,20 +21,25 @@ pub trait Board {
     /// Sets the wheels to follow a velocity.
     fn follow(&mut self, velocity: VelocityCommand);
 
-    /// Feeds the watchdog, once in each turn of the main loop.
-    fn feed_watchdog(&mut self);
+    /// Feeds the watchdog, once in each turn of the main loop. The default does nothing.
+    fn feed_watchdog(&mut self) {}
 
     /// The time since the start in milliseconds; it wraps.
     fn now_ms(&mut self) -> u32;
 
-    /// The largest stack use since the start in bytes; 0 if it is not measured.
-    fn stack_high_water_bytes(&mut self) -> u32;
+    /// The largest stack use since the start in bytes; 0, the default, if it is not measured.
+    fn stack_high_water_bytes(&mut self) -> u32 {
+        0
+    }
 
-    /// Stores a snapshot so that it survives a power cut. The robot stands still during the call.
+    /// Stores a snapshot so that it survives a power cut. The robot stands still during the call. The default stores nothing.
     ///
     /// # Errors
-    /// [`SaveError`]; earlier snapshots must then still be stored.
-    fn save(&mut self, snapshot: &[u8]) -> Result<(), SaveError>;
+    /// [`SaveError`]; earlier snapshots must then still be stored. The default is [`SaveError::NoStore`].
+    fn save(&mut self, snapshot: &[u8]) -> Result<(), SaveError> {
+        let _ = snapshot;
+        Err(SaveError::NoStore)
+    }
 }
 
 /// Why a snapshot was not stored.

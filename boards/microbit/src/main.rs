@@ -22,7 +22,7 @@ use toposlam::{
     drive::VelocityCommand,
     reference::small::{self, SmallRobot},
     ring::{Echo, RingFrame},
-    robot::{Board, SaveError},
+    robot::Board,
     wire::QueueFull,
 };
 
@@ -81,18 +81,12 @@ impl Board for Microbit {
     /// The command is in the message `Velocity`.
     fn follow(&mut self, _: VelocityCommand) {}
 
-    fn feed_watchdog(&mut self) {}
-
     fn now_ms(&mut self) -> u32 {
         (self.ticks / u64::from(TICKS_PER_MS)) as u32
     }
 
     fn stack_high_water_bytes(&mut self) -> u32 {
         stack::stack_high_water_bytes()
-    }
-
-    fn save(&mut self, _: &[u8]) -> Result<(), SaveError> {
-        Err(SaveError::NoStore)
     }
 }
 

@@ -7,6 +7,7 @@ use toposlam::{
     ring::RingFrame,
     ring::drivers::{
         FiringPlan, HcSr04Config, HcSr04Ring, MaxBotixConfig, MaxBotixRing, SonarRing, Srf08Config, Srf08Ring,
+        Vl53l1xBudget, Vl53l1xConfig, Vl53l1xRing,
     },
 };
 
@@ -80,6 +81,43 @@ pub(crate) fn max_botix(settings: &MaxBotix<'_>, bus: impl I2c) {
     assert!(ring.release().0.transactions <= FRAMES * SONARS as u32 * (1 + rounds));
     let group_us = u64::from(config.cycle_ms) * 1000;
     assert_eq!(waited.microseconds(), u64::from(FRAMES) * config.plan.group_count() as u64 * group_us);
+}
+
+#[derive(Arbitrary, Debug)]
+pub(crate) struct Vl53l1x<'a> {
+    groups: &'a [u8],
+    first_address: Option<u8>,
+    is_short: bool,
+    has_2v8_io: bool,
+    timeout_ms: u8,
+    range_mm: Option<(u16, u16)>,
+}
+
+pub(crate) fn vl53l1x(settings: &Vl53l1x<'_>, bus: impl I2c, pins: &[u8]) {
+    let default = Vl53l1xConfig::<SONARS>::DEFAULT;
+    let (min_range_mm, max_range_mm) = settings.range_mm.unwrap_or((default.min_range_mm, default.max_range_mm));
+    let config = default
+        .with_first_address(settings.first_address.unwrap_or(default.first_address))
+        .with_plan(plan(settings.groups))
+        .with_budget(if settings.is_short { Vl53l1xBudget::Ms33 } else { Vl53l1xBudget::Ms100 })
+        .with_has_2v8_io(settings.has_2v8_io)
+        .with_timeout_ms(settings.timeout_ms.into())
+        .with_min_range_mm(min_range_mm)
+        .with_max_range_mm(max_range_mm);
+    let waited = Waited::default();
+    let bus = Counted { bus, transactions: 0 };
+    let Ok(mut ring) = Vl53l1xRing::<_, _, SONARS>::new(bus, &waited, config) else { return };
+    let pin_calls = Budget::new(3 * SONARS as u32);
+    let mut xshut: [_; SONARS] =
+        std::array::from_fn(|sensor| Answers { next: sensor, ..Answers::new(pins, &pin_calls) });
+    let _ = ring.start(&mut xshut);
+    for _ in 0..FRAMES {
+        check_frame(&mut ring, min_range_mm, max_range_mm);
+    }
+    let rounds = 1 + u32::from(config.timeout_ms) / 5;
+    assert!(ring.release().0.transactions <= SONARS as u32 * (132 + FRAMES * (1 + 2 * rounds)));
+    let frame_us = config.plan.group_count() as u64 * u64::from(config.timeout_ms) * 1000;
+    assert!(waited.microseconds() <= 1000 + SONARS as u64 * 550_000 + u64::from(FRAMES) * frame_us);
 }
 
 #[derive(Arbitrary, Debug)]

@@ -9,6 +9,7 @@ use toposlam::{
     FaultCounters, FaultKind,
     ring::drivers::{
         HcSr04Config, HcSr04Ring, MaxBotixConfig, MaxBotixRing, MicrosecondClock, SonarRing, Srf08Config, Srf08Ring,
+        Vl53l1xConfig, Vl53l1xRing,
     },
     ring::{Echo, RingFrame},
 };
@@ -112,11 +113,20 @@ proptest! {
             prop_assert!(waited.nanoseconds <= 2 * 100_000_000);
         }
         let mut waited = Waited::default();
-        let mut ring = MaxBotixRing::new(Noise::of(bytes), &mut waited, MaxBotixConfig::DEFAULT).unwrap();
+        let mut ring = MaxBotixRing::new(Noise::of(bytes.clone()), &mut waited, MaxBotixConfig::DEFAULT).unwrap();
         let mut faults = FaultCounters::new();
         assert_sound(ring.read(&mut faults), &faults, 200, 7640);
         prop_assert!(ring.release().0.transfers <= 16 * 12);
         prop_assert_eq!(waited.nanoseconds, 2 * 100_000_000);
+        let mut waited = Waited::default();
+        let mut ring = Vl53l1xRing::new(Noise::of(bytes.clone()), &mut waited, Vl53l1xConfig::DEFAULT).unwrap();
+        let mut xshut: [_; 16] = std::array::from_fn(|sensor| Noise { next: sensor, ..Noise::of(bytes.clone()) });
+        let _ = ring.start(&mut xshut);
+        let mut faults = FaultCounters::new();
+        assert_sound(ring.read(&mut faults), &faults, 40, 4000);
+        // At most 110 polls and 22 messages of the start, and 60 polls of two messages.
+        prop_assert!(ring.release().0.transfers <= 16 * (132 + 1 + 120));
+        prop_assert!(waited.nanoseconds <= 1_000_000 + 16 * 550_000_000 + 300_000_000);
     }
 
     #[test]

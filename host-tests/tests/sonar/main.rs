@@ -9,6 +9,7 @@ mod link;
 mod maxbotix;
 mod srf08;
 mod srf10;
+mod vl53l1x;
 
 use embedded_hal::delay::DelayNs;
 use toposlam::{

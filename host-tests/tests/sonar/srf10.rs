@@ -1,4 +1,4 @@
-//! The ring of SRF10: the driver of the SRF08, and sensors that do not acknowledge while they measure.
+//! The rings of SRF10 and SRF02: the driver of the SRF08, and sensors that do not acknowledge while they measure.
 
 use embedded_hal::i2c::{ErrorKind, NoAcknowledgeSource};
 use embedded_hal_mock::eh1::i2c::{Mock as I2cMock, Transaction};
@@ -58,5 +58,22 @@ fn a_single_group_starts_each_sensor_at_its_own_address() {
     let mut waited = Waited::default();
     let mut ring = Srf08Ring::<_, _, 2>::new(I2cMock::new(&expected), &mut waited, config).unwrap();
     assert_eq!(ring.read(&mut FaultCounters::new()).echoes, [Echo::Silence, Echo::Range { range_mm: 1000 }]);
+    ring.release().0.done();
+}
+
+#[test]
+fn the_srf02_is_read_as_the_srf10_from_150_mm_on() {
+    // The round trip of 150 mm at 343 m/s takes 875 us; that of 149 mm takes 869 us.
+    let expected = [
+        Transaction::write(0x70, vec![0x00, 0x52]),
+        Transaction::write(0x71, vec![0x00, 0x52]),
+        Transaction::write_read(0x70, vec![0x00], vec![0x05, 0x80, 0x03, 0x6B]),
+        Transaction::write_read(0x71, vec![0x00], vec![0x05, 0x80, 0x03, 0x65]),
+    ];
+    let config = Srf08Config::SRF02.with_plan(FiringPlan::together());
+    let mut waited = Waited::default();
+    let mut ring = Srf08Ring::<_, _, 2>::new(I2cMock::new(&expected), &mut waited, config).unwrap();
+    assert_eq!(ring.read(&mut FaultCounters::new()).echoes, [Echo::Range { range_mm: 150 }, Echo::Dead]);
+    assert_eq!(ring.last_error(), Some(SonarError { sensor: 1, fault: SonarFault::OutOfRange }));
     ring.release().0.done();
 }

@@ -46,6 +46,8 @@ enum Task {
     Monitor(command::monitor::Arguments),
     /// Export a robot's map as GraphML, DOT, GeoJSON, JSON or SVG.
     Export(command::export::Arguments),
+    /// Merge the maps of two robots or two runs in one building.
+    Merge(command::merge::Arguments),
     /// Monitor many robots in one thread, and measure the cost.
     Fleet(command::fleet::Arguments),
     /// Serve many recorded robots at one TCP port.
@@ -85,6 +87,7 @@ fn run(task: Task) -> anyhow::Result<()> {
         Task::Play(arguments) => command::play::run(&arguments),
         Task::Monitor(arguments) => command::monitor::run(&arguments),
         Task::Export(arguments) => command::export::run(&arguments),
+        Task::Merge(arguments) => command::merge::run(&arguments),
         Task::Fleet(arguments) => command::fleet::run(&arguments),
         Task::Robots(arguments) => command::robots::run(&arguments),
         Task::Publish(arguments) => command::publish::run(&arguments),

@@ -10,11 +10,13 @@ pub mod broadcast;
 pub mod client;
 pub mod event_text;
 pub mod export;
+pub mod import;
 pub mod json;
 pub mod layout;
 pub mod line;
 pub mod link;
 pub mod listener;
+pub mod merge;
 pub mod playback;
 #[cfg(feature = "recording")]
 pub mod recording;

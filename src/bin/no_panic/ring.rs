@@ -13,10 +13,10 @@ use toposlam::{
     FaultCounters, FaultKind,
     ring::drivers::{
         AddressError, BridgeError, FiringPlan, HcSr04Config, HcSr04Ring, MaxBotixConfig, MaxBotixRing,
-        MicrosecondClock, Sc18im700, SonarError, SonarRing, Srf08Config, Srf08Ring, change_maxbotix_address,
-        change_srf08_address,
+        MicrosecondClock, Sc18im700, SonarError, SonarRing, Srf08Config, Srf08Ring, Vl53l1xConfig, Vl53l1xRing,
+        change_maxbotix_address, change_srf08_address,
     },
-    ring::{Echo, RingFrame},
+    ring::{Echo, RingFrame, RingGeometry, ScanPoint},
 };
 
 use super::any::{Opaque, show};
@@ -169,8 +169,20 @@ fn i2c_rings(mut bus: impl I2c) {
         Err(error) => show::<toposlam::ConfigError>(error),
     }
     let config = MaxBotixConfig::default().with_plan(any_plan());
-    match MaxBotixRing::<_, _, 16>::new(bus, AnyDelay, config.opaque()) {
+    match MaxBotixRing::<_, _, 16>::new(&mut bus, AnyDelay, config.opaque()) {
         Ok(mut ring) => read(&mut ring),
+        Err(error) => show::<toposlam::ConfigError>(error),
+    }
+    tof_ring(bus);
+}
+
+fn tof_ring(bus: impl I2c) {
+    let config = Vl53l1xConfig::default().with_plan(any_plan());
+    match Vl53l1xRing::<_, _, 16>::new(bus, AnyDelay, config.opaque()) {
+        Ok(mut ring) => {
+            let _ = black_box(ring.start(&mut core::array::from_fn(|_| AnyPin)));
+            read(&mut ring);
+        }
         Err(error) => show::<toposlam::ConfigError>(error),
     }
 }
@@ -201,4 +213,7 @@ pub(crate) fn fault() {
 pub(crate) fn ring() {
     black_box(Echo::Silence.opaque().range_mm());
     black_box(RingFrame { echoes: [Echo::Dead.opaque(); 16] }.dead_sensors().last());
+    black_box(RingFrame::from_ranges([Some(5), None].opaque()));
+    let points = [ScanPoint { bearing_mrad: 5, range_mm: 5 }; 20].opaque();
+    black_box(RingFrame::<16>::from_points(points, &RingGeometry::even().opaque()));
 }

@@ -18,7 +18,7 @@ const PAUSE_MS: u32 = 10;
 /// Any register serves as a probe.
 const PROBE_BYTES: usize = 2;
 
-/// Changes the 7-bit address of an SRF08 or SRF10 to one from 0x70 to 0x7F.
+/// Changes the 7-bit address of an SRF02, SRF08 or SRF10 to one from 0x70 to 0x7F.
 ///
 /// Checks that no device answers at the new address, writes 0xA0, 0xAA, 0xA5 and the new 8-bit address to register 0 in four
 /// messages, and polls the new address for at most 200 ms.

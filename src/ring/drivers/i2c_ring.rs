@@ -12,8 +12,8 @@ use crate::ring::RingFrame;
 
 /// A kind of ranger on an I2C bus: one message starts a measurement, another polls for its result.
 ///
-/// [`Srf08Config`](super::Srf08Config) and [`MaxBotixConfig`](super::MaxBotixConfig) implement it. A new kind of ranger
-/// implements it and uses [`I2cRing`].
+/// [`Srf08Config`](super::Srf08Config), [`MaxBotixConfig`](super::MaxBotixConfig) and
+/// [`Vl53l1xConfig`](super::Vl53l1xConfig) implement it. A new kind of ranger implements it and uses [`I2cRing`].
 pub trait I2cRanger<const SONARS: usize> {
     /// Checks the settings, once, before the first frame.
     ///
@@ -68,9 +68,9 @@ pub struct RangingTiming {
 /// wait is bounded, so a frame ends whatever the sensors answer, provided that each message on the bus ends.
 #[derive(Debug)]
 pub struct I2cRing<BUS, DELAY, RANGER, const SONARS: usize> {
-    bus: BUS,
-    delay: DELAY,
-    ranger: RANGER,
+    pub(super) bus: BUS,
+    pub(super) delay: DELAY,
+    pub(super) ranger: RANGER,
     last_error: Option<SonarError>,
 }
 
@@ -93,13 +93,13 @@ impl<BUS: I2c, DELAY: DelayNs, RANGER: I2cRanger<SONARS>, const SONARS: usize> I
     fn fire(&mut self, group: u8, readings: &mut Readings<SONARS>) {
         match self.ranger.broadcast_address() {
             Some(address) if self.ranger.plan().is_together() => {
-                if let Err(fault) = self.start(address) {
+                if let Err(fault) = self.start_at(address) {
                     readings.complete(group, Err(fault));
                 }
             }
             _ => {
                 for (sensor, reading) in readings.pending(group) {
-                    if let Err(fault) = self.start(self.address(sensor)) {
+                    if let Err(fault) = self.start_at(self.address(sensor)) {
                         *reading = Reading::Done(Err(fault));
                     }
                 }
@@ -107,7 +107,7 @@ impl<BUS: I2c, DELAY: DelayNs, RANGER: I2cRanger<SONARS>, const SONARS: usize> I
         }
     }
 
-    fn start(&mut self, address: u8) -> Result<(), SonarFault> {
+    fn start_at(&mut self, address: u8) -> Result<(), SonarFault> {
         self.ranger.start(&mut self.bus, address).map_err(|error| match error.kind() {
             ErrorKind::NoAcknowledge(_) => SonarFault::Silent,
             _ => SonarFault::Bus,
@@ -142,7 +142,7 @@ impl<BUS: I2c, DELAY: DelayNs, RANGER: I2cRanger<SONARS>, const SONARS: usize> I
         }
     }
 
-    fn address(&self, sensor: usize) -> u8 {
+    pub(super) fn address(&self, sensor: usize) -> u8 {
         // Does not wrap: the configuration was checked.
         self.ranger.first_address().wrapping_add(sensor as u8)
     }

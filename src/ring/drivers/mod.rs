@@ -2,15 +2,19 @@
 //!
 //! | Sensor | Ring | Bus | File |
 //! |---|---|---|---|
-//! | Devantech SRF08, SRF10 | [`Srf08Ring`] | any I2C bus | `srf08.rs` |
+//! | Devantech SRF02, SRF08, SRF10 | [`Srf08Ring`] | any I2C bus | `srf08.rs` |
 //! | MaxBotix I2CXL-MaxSonar | [`MaxBotixRing`] | any I2C bus | `maxbotix.rs` |
 //! | HC-SR04 | [`HcSr04Ring`] | two pins for each sensor, and a microsecond clock | `hcsr04.rs` |
+//! | ST VL53L1X | [`Vl53l1xRing`] | any I2C bus, and a pin for each sensor | `vl53l1x.rs` |
+//! | any lidar | [`RingFrame::from_points`] | | |
+//! | any other ring | [`RingFrame::from_ranges`] | | |
 //!
 //! [`Sc18im700`] is an I2C bus behind a UART. `docs/wiring.md` shows how to wire each ring.
 //!
 //! The sensors of a ring fire in the groups of its [`FiringPlan`]. [`SonarRing::read`] blocks until the frame is complete.
 //! Every wait has a timeout, so it returns in bounded time, however many sensors are dead. I2C sensors have the same address
-//! when new; [`change_srf08_address`] and [`change_maxbotix_address`] change it.
+//! when new; [`change_srf08_address`] and [`change_maxbotix_address`] change it. [`Vl53l1xRing::start`] does it after each
+//! power-on.
 //!
 //! # How to add a sensor
 //!
@@ -53,13 +57,6 @@
 //! let mut faults = FaultCounters::new();
 //! assert_eq!(Constant(1200).read(&mut faults).dead_sensors().count(), 0);
 //! ```
-//!
-//! # VL53L1X
-//!
-//! There is no driver for this time-of-flight sensor because no published crate fits. `vl53l1x` 1.2.0 needs `std` and
-//! compiles C code for Linux. `vl53l1x-uld` 2.0.1 and `vl53l1` 0.1.2 are for `embedded-hal` 0.2. `vl53l1x-simple` 0.2.0 is
-//! for `embedded-hal` 1.0 without `std`, but it divides by a number that it reads from the sensor, so a sensor or a bus that
-//! answers 0 makes it panic; and it does not return the status of a range, so "no target" is reported as a range.
 
 use core::fmt;
 
@@ -75,6 +72,8 @@ mod reading;
 mod sc18im700;
 mod sound;
 mod srf08;
+mod vl53l1x;
+mod vl53l1x_settings;
 
 pub use address::{AddressError, change_maxbotix_address, change_srf08_address};
 pub use firing::FiringPlan;
@@ -84,6 +83,7 @@ pub use maxbotix::{MaxBotixConfig, MaxBotixRing};
 pub use reading::Reading;
 pub use sc18im700::{BridgeError, Sc18im700};
 pub use srf08::{Srf08Config, Srf08Ring};
+pub use vl53l1x::{Vl53l1xBudget, Vl53l1xConfig, Vl53l1xRing};
 
 /// A ring of `SONARS` range sensors.
 pub trait SonarRing<const SONARS: usize> {

@@ -1,9 +1,10 @@
-//! Devantech SRF08 and SRF10 ultrasonic rangers: up to 16 on one I2C bus.
+//! Devantech SRF02, SRF08 and SRF10 ultrasonic rangers: up to 16 on one I2C bus.
 //!
-//! Source: Devantech, *SRF08 Ultra sonic range finder, Technical Specification*, and the same for the SRF10. Register 0 is
-//! the command register when written and the software revision when read. During a measurement the ranger does not
-//! drive the bus, so the revision reads as 255. Register 1 is the light sensor (the SRF10 has none). Registers 2 and 3 are
-//! the first echo, high byte first, 0 without an echo. A command to address 0 starts every SRF08 on the bus.
+//! Source: Devantech, *SRF08 Ultra sonic range finder, Technical Specification*, and the same for the SRF02 and the SRF10.
+//! Register 0 is the command register when written and the software revision when read. During a measurement the ranger does
+//! not drive the bus, so the revision reads as 255. Register 1 is the light sensor of the SRF08, unused by the others.
+//! Registers 2 and 3 are the first echo, high byte first, 0 without an echo. A command to address 0 starts every SRF08 on
+//! the bus.
 
 use crate::setters::setters;
 use core::ops::RangeInclusive;
@@ -27,7 +28,7 @@ const RANGE_IN_MICROSECONDS: u8 = 0x52;
 /// The 7-bit addresses of these rangers.
 pub(super) const ADDRESSES: RangeInclusive<u8> = 0x70..=0x7F;
 
-/// Addresses, firing plan, times and range limits of a ring of SRF08 or SRF10.
+/// Addresses, firing plan, times and range limits of a ring of SRF02, SRF08 or SRF10.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub struct Srf08Config<const SONARS: usize> {
@@ -35,8 +36,8 @@ pub struct Srf08Config<const SONARS: usize> {
     pub first_address: u8,
     /// Which sensors fire together. Default: two groups, even and odd indices.
     pub plan: FiringPlan<SONARS>,
-    /// Whether one message to address 0 starts all sensors when the plan fires them together. Default true. The data sheet
-    /// of the SRF10 does not mention this address.
+    /// Whether one message to address 0 starts all sensors when the plan fires them together. Default true. The data sheets
+    /// of the SRF02 and the SRF10 do not mention this address.
     pub has_general_call: bool,
     /// Timeout of a firing group, in milliseconds, at least 1. Default 100; a measurement takes 65.
     pub timeout_ms: u16,
@@ -44,7 +45,7 @@ pub struct Srf08Config<const SONARS: usize> {
     pub poll_interval_us: u16,
     /// Speed of sound in metres per second, 300 to 400. Default 343: dry air at 20 °C.
     pub speed_of_sound_m_per_s: u16,
-    /// Minimum valid range, in millimetres. Default 30, from the data sheet.
+    /// Minimum valid range, in millimetres. Default 30, from the data sheet; 150 for the SRF02.
     pub min_range_mm: u16,
     /// Maximum valid range, in millimetres. Default 6000, from the data sheet.
     pub max_range_mm: u16,
@@ -76,6 +77,9 @@ impl<const SONARS: usize> Srf08Config<SONARS> {
 
     /// The same for the SRF10, without the common address.
     pub const SRF10: Self = Self { has_general_call: false, ..Self::DEFAULT };
+
+    /// The same for the SRF02. It has one transducer, so it does not receive an echo from nearer than some 150 mm.
+    pub const SRF02: Self = Self { min_range_mm: 150, ..Self::SRF10 };
 
     /// Converts the time of the first echo to a range.
     fn echo(&self, flight_us: u16) -> Result<Echo, SonarFault> {
@@ -140,7 +144,7 @@ impl<const SONARS: usize> I2cRanger<SONARS> for Srf08Config<SONARS> {
     }
 }
 
-/// A ring of `SONARS` SRF08 or SRF10 at consecutive addresses of one I2C bus, at most 16.
+/// A ring of `SONARS` SRF02, SRF08 or SRF10 at consecutive addresses of one I2C bus, at most 16.
 ///
 /// A frame takes one measurement (65 ms by the data sheet) for each firing group, and waits at most `timeout_ms` for each.
 pub type Srf08Ring<BUS, DELAY, const SONARS: usize> = I2cRing<BUS, DELAY, Srf08Config<SONARS>, SONARS>;

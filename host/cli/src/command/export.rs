@@ -1,4 +1,4 @@
-//! `toposlam export`: a robot's map as GraphML, DOT, GeoJSON, JSON or SVG.
+//! `toposlam export`: a robot's map as GraphML, DOT, GeoJSON, JSON, SVG, or a snapshot to localise on.
 
 use std::ffi::{OsStr, OsString};
 use std::fs::File;
@@ -10,17 +10,19 @@ use clap::{Args, ValueEnum};
 use toposlam_cli::{errln, output};
 use toposlam_link::client::Client;
 use toposlam_link::export;
+use toposlam_link::import;
 use toposlam_link::layout::Layout;
 use toposlam_link::line;
 use toposlam_link::listener::{Event, Listener, Understanding};
 #[cfg(feature = "recording")]
 use toposlam_link::recording::{self, RecordingError};
+use toposlam_link::topology::TopologicalMap;
 
 /// Arguments of `toposlam export`.
 #[derive(Args)]
 pub(crate) struct Arguments {
-    /// Source of the map: serial port of a robot, tcp:HOST:PORT, recording (FILE.mcap, feature `recording`), file with the bytes of a
-    /// line, or - for such bytes on the standard input.
+    /// Source of the map: serial port of a robot, tcp:HOST:PORT, recording (FILE.mcap, feature `recording`), JSON of this command or a
+    /// snapshot, file with the bytes of a line, or - for such bytes on the standard input.
     source: OsString,
     /// Output format.
     #[arg(long)]
@@ -37,6 +39,10 @@ pub(crate) struct Arguments {
     /// Approximate length of an edge in GeoJSON, in metres, 0.1 to 1000.
     #[arg(long, value_name = "METRES", default_value_t = 5.0, value_parser = edge_m)]
     edge_m: f64,
+    /// How far the robot drives in a ring frame, in millimetres, 0.1 to 1000: edges with a travel time get their length as their cost
+    /// in GeoJSON.
+    #[arg(long, value_name = "MM", value_parser = frame_mm)]
+    frame_mm: Option<f64>,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
@@ -46,30 +52,37 @@ enum Format {
     Geojson,
     Json,
     Svg,
+    /// A snapshot with which a robot localises on the map (`toposlam command LINE restore`).
+    Snapshot,
 }
 
 fn edge_m(text: &str) -> Result<f64, String> {
     super::drive::number_in(text, 0.1..=1000.0)
 }
 
+fn frame_mm(text: &str) -> Result<f64, String> {
+    super::drive::number_in(text, 0.1..=1000.0)
+}
+
 pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
-    let listener = listen(&arguments.source, arguments.baud)?;
-    complain(&listener);
-    let map = listener.map();
-    ensure!(!map.vertices.is_empty(), "{}: no map received", arguments.source.display());
+    let (map, here) = read(&arguments.source, arguments.baud)?;
     let mut layout = Layout::new();
     layout.arrange(&map);
-    let here = listener.replica().location().map(|location| location.vertex);
     let text = match arguments.format {
         Format::Graphml => export::graphml(&map, &layout, here),
         Format::Dot => export::dot(&map, &layout, here),
-        Format::Geojson => export::geojson(&map, &layout, here, arguments.edge_m),
+        Format::Geojson => export::geojson(&map, &layout, here, arguments.edge_m, arguments.frame_mm),
         Format::Json => export::json(&map, &layout, here),
         Format::Svg => export::svg(&map, &layout, here),
+        Format::Snapshot => return write(arguments, &import::known_map(&map)?),
     };
+    write(arguments, text.as_bytes())
+}
+
+fn write(arguments: &Arguments, bytes: &[u8]) -> anyhow::Result<()> {
     match &arguments.output {
-        Some(file) => output::write_file(file, text, arguments.force),
-        None => Ok(output::write_bytes(text.as_bytes())?),
+        Some(file) => output::write_file(file, bytes, arguments.force),
+        None => Ok(output::write_bytes(bytes)?),
     }
 }
 
@@ -83,6 +96,30 @@ fn complain(listener: &Listener) {
         0 => {}
         restarts => errln!("{restarts} restarts of the robot; the map is that of the last start"),
     }
+}
+
+/// The map of a source, and the vertex of the robot if it is known.
+pub(crate) fn read(source: &OsStr, baud: u32) -> anyhow::Result<(TopologicalMap, Option<u8>)> {
+    if let Some(map) = map_file(Path::new(source)).with_context(|| format!("reading {}", source.display()))? {
+        return Ok((map, None));
+    }
+    let listener = listen(source, baud)?;
+    complain(&listener);
+    let map = listener.map();
+    ensure!(!map.vertices.is_empty(), "{}: no map received", source.display());
+    Ok((map, listener.replica().location().map(|location| location.vertex)))
+}
+
+/// The map of a file in JSON or of a snapshot; `None` for any other source.
+fn map_file(path: &Path) -> anyhow::Result<Option<TopologicalMap>> {
+    if !path.is_file() || path.extension().is_some_and(|extension| extension == "mcap") {
+        return Ok(None);
+    }
+    let bytes = std::fs::read(path)?;
+    if bytes.trim_ascii_start().starts_with(b"{") {
+        return Ok(Some(import::json(std::str::from_utf8(&bytes)?)?));
+    }
+    Ok(import::snapshot(&bytes).ok())
 }
 
 /// Reads the map of a source; returns the listener that holds it.

@@ -16,6 +16,7 @@ mod hardship;
 mod hardware;
 mod interrupt;
 mod machine;
+pub(crate) mod merge;
 #[cfg(not(all(feature = "mqtt", feature = "recording")))]
 mod missing;
 pub(crate) mod monitor;

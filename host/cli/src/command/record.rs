@@ -1,6 +1,7 @@
-//! `toposlam record`: record the line of a robot in an MCAP file.
+//! `toposlam record`: record the line of a robot in an MCAP file, or in a ROS 2 bag.
 
-use std::io::ErrorKind;
+use std::fs::File;
+use std::io::{BufWriter, ErrorKind};
 use std::path::PathBuf;
 use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 
@@ -8,7 +9,7 @@ use anyhow::Context;
 use clap::Args;
 use toposlam_cli::outln;
 use toposlam_link::line::{Line, open};
-use toposlam_link::recording::Recorder;
+use toposlam_link::recording::{Recorder, RecordingError, Ros2Bag, Summary};
 
 use super::interrupt::Interrupt;
 
@@ -19,7 +20,7 @@ const BUFFER_BYTES: usize = 4096;
 pub(crate) struct Arguments {
     /// Serial port of the robot, or tcp:HOST:PORT.
     line: String,
-    /// MCAP file to create; an existing file is an error.
+    /// MCAP file to create, with --ros2 the folder of the bag; if it exists, that is an error.
     file: PathBuf,
     /// Baud rate of a serial port.
     #[arg(long, default_value_t = 115_200)]
@@ -30,12 +31,60 @@ pub(crate) struct Arguments {
     /// Stop after this many places.
     #[arg(long)]
     places: Option<u32>,
+    /// Write a ROS 2 bag: ring, map and route graph in messages of ROS 2, without the bytes of the line.
+    #[arg(long)]
+    ros2: bool,
+    /// How far the robot drives in a ring frame, in millimetres, 0.1 to 1000: edges with a travel time get their length as their cost
+    /// in the route graph of a ROS 2 bag.
+    #[arg(long, value_name = "MM", value_parser = frame_mm, requires = "ros2")]
+    frame_mm: Option<f64>,
+}
+
+fn frame_mm(text: &str) -> Result<f64, String> {
+    super::drive::number_in(text, 0.1..=1000.0)
+}
+
+/// What is written.
+enum Output {
+    Mcap(Box<Recorder<BufWriter<File>>>),
+    Ros2(Box<Ros2Bag>),
+}
+
+impl Output {
+    fn create(arguments: &Arguments) -> Result<Self, RecordingError> {
+        Ok(if arguments.ros2 {
+            Self::Ros2(Box::new(Ros2Bag::create(&arguments.file, arguments.frame_mm)?))
+        } else {
+            Self::Mcap(Box::new(Recorder::create(&arguments.file)?))
+        })
+    }
+
+    fn record(&mut self, bytes: &[u8], time_ns: u64) -> Result<(), RecordingError> {
+        match self {
+            Self::Mcap(recorder) => recorder.record(bytes, time_ns),
+            Self::Ros2(bag) => bag.record(bytes, time_ns),
+        }
+    }
+
+    fn summary(&self) -> Summary {
+        match self {
+            Self::Mcap(recorder) => recorder.summary(),
+            Self::Ros2(bag) => bag.summary(),
+        }
+    }
+
+    fn finish(self) -> Result<Summary, RecordingError> {
+        match self {
+            Self::Mcap(recorder) => recorder.finish(),
+            Self::Ros2(bag) => bag.finish(),
+        }
+    }
 }
 
 pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     let mut line = open(&arguments.line, arguments.baud)?;
     let file = &arguments.file;
-    let mut recorder = Recorder::create(file).with_context(|| format!("creating {}", file.display()))?;
+    let mut recorder = Output::create(arguments).with_context(|| format!("creating {}", file.display()))?;
     let interrupt = Interrupt::watch()?;
     // A monotonic clock: the system clock may be adjusted during the recording.
     let start = Instant::now();

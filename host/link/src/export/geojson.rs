@@ -13,7 +13,10 @@ use crate::topology::TopologicalMap;
 /// `ways`, their number, and `frontiers`, the positions of those that nobody has driven. The `metadata` of a line is then
 /// `start_way`, `end_way` and, if it is known, `travel_frames`. Self-loops are not exported as lines. The coordinates are those
 /// of the drawing, in metres, with edges about `edge_m` long; they are not positions in the building.
-pub fn geojson(map: &TopologicalMap, layout: &Layout, here: Option<u8>, edge_m: f64) -> String {
+///
+/// With `frame_mm`, how far the robot drives in a ring frame, a line whose travel time is known has a `cost`, its length in
+/// metres, which Nav2 then does not compute from the coordinates.
+pub fn geojson(map: &TopologicalMap, layout: &Layout, here: Option<u8>, edge_m: f64, frame_mm: Option<f64>) -> String {
     // Rounded to the millimetre.
     let position = |point: &Point| json!([point.x, point.y].map(|unit| (unit * edge_m * 1000.0).round() / 1000.0));
     let nodes = (0..).zip(map.vertices.iter().zip(layout.points())).map(|(vertex, (label, point))| {
@@ -44,6 +47,10 @@ pub fn geojson(map: &TopologicalMap, layout: &Layout, here: Option<u8>, edge_m: 
             }
             if let Some(frames) = edge.and_then(|edge| edge.travel_frames) {
                 properties["metadata"]["travel_frames"] = frames.into();
+                if let Some(frame_mm) = frame_mm {
+                    properties["cost"] = (f64::from(frames) * frame_mm / 1000.0).into();
+                    properties["overridable"] = false.into();
+                }
             }
             lines.push(feature("LineString", points.iter().map(position).collect(), properties));
             points.reverse();
@@ -73,7 +80,7 @@ mod tests {
     #[test]
     fn geojson_has_two_lines_per_edge_and_unique_ids() {
         let (map, layout) = sample::map();
-        let collection: Value = serde_json::from_str(&geojson(&map, &layout, Some(3), 5.0)).unwrap();
+        let collection: Value = serde_json::from_str(&geojson(&map, &layout, Some(3), 5.0, None)).unwrap();
         let features = collection["features"].as_array().unwrap();
         let of_kind =
             |kind: &str| features.iter().filter(|feature| feature["geometry"]["type"] == kind).collect::<Vec<_>>();
@@ -96,7 +103,7 @@ mod tests {
     #[test]
     fn parallel_edges_have_lines_of_their_own_with_bends() {
         let (map, layout) = sample::with_ways();
-        let collection: Value = serde_json::from_str(&geojson(&map, &layout, None, 5.0)).unwrap();
+        let collection: Value = serde_json::from_str(&geojson(&map, &layout, None, 5.0, None)).unwrap();
         let features = collection["features"].as_array().unwrap();
         let lines: Vec<&Value> =
             features.iter().filter(|feature| feature["geometry"]["type"] == "LineString").collect();
@@ -109,5 +116,15 @@ mod tests {
         assert_eq!((points(0).len(), points(2).len()), (2, 3));
         assert_eq!(points(2)[0], points(3)[2]);
         assert_eq!(features[0]["properties"]["metadata"]["frontiers"], json!([4]));
+        assert_eq!(lines[0]["properties"]["cost"], Value::Null);
+    }
+
+    #[test]
+    fn with_the_distance_of_a_frame_a_line_with_a_travel_time_costs_its_length() {
+        let (map, layout) = sample::with_ways();
+        let collection: Value = serde_json::from_str(&geojson(&map, &layout, None, 5.0, Some(30.0))).unwrap();
+        let features = collection["features"].as_array().unwrap();
+        let costs: Vec<&Value> = features[2..].iter().map(|line| &line["properties"]["cost"]).collect();
+        assert_eq!(costs, [&json!(1.62), &json!(1.62), &Value::Null, &Value::Null]);
     }
 }

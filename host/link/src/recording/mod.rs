@@ -26,6 +26,7 @@
 mod error;
 mod reader;
 mod recorder;
+mod ros2;
 mod scene;
 #[cfg(test)]
 mod tests;
@@ -36,6 +37,7 @@ use std::path::Path;
 pub use error::RecordingError;
 pub use reader::{Recording, TimedFrame};
 pub use recorder::{Recorder, Summary};
+pub use ros2::Ros2Bag;
 pub use scene::{MAP_FRAME, METRES_PER_EDGE, ROBOT_FRAME};
 pub use topics::Topic;
 

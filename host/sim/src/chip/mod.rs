@@ -2,7 +2,7 @@
 //! and for tests.
 //!
 //! [`Sc18im700`] takes the bytes that the firmware sends and returns the bytes that the real chip would return.
-//! [`Srf08Bank`] and [`MaxBotixBank`] are rangers behind the bridge, or on an [`I2cBus`] of the controller's own.
+//! [`Srf08Bank`], [`MaxBotixBank`] and [`Vl53l1xBank`] are rangers behind the bridge, or on an [`I2cBus`] of the controller's own.
 //! [`HcSr04Bank`] drives the pins of its rangers. All rangers measure a world of ring frames; [`SimulatedTime`] is the
 //! clock of those that need one. [`FlashModel`] is a NOR flash whose power can be cut at any operation.
 
@@ -14,6 +14,7 @@ mod sc18im700;
 mod srf08;
 mod surroundings;
 mod time;
+mod vl53l1x;
 
 pub use bus::{BusAnswer, I2cBus, I2cDevices};
 pub use flash::{Cut, FlashFault, FlashModel, Tear};
@@ -22,6 +23,7 @@ pub use maxbotix::MaxBotixBank;
 pub use sc18im700::Sc18im700;
 pub use srf08::Srf08Bank;
 pub use time::SimulatedTime;
+pub use vl53l1x::{Vl53l1xBank, Xshut};
 
 /// A fault that a test injects into a sensor on an I2C bus.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

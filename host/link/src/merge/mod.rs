@@ -1,0 +1,182 @@
+//! Merges two maps of one building: finds the part that both have, and folds it.
+//!
+//! Two ways, one of each map, taken for the same way determine an *alignment*: which vertices and ways of the maps are the
+//! same, along all edges that both maps have. Each pair of ways gives one. An alignment is scored by the evidence for and
+//! against it, as a log-likelihood ratio against two unrelated parts of the building. The best one is taken if its probability
+//! is high enough, with the alignments that contradict it and with no common part as alternatives, and if it does not contradict
+//! itself. Parts that the maps have in
+//! common elsewhere are aligned in the same way afterwards.
+//!
+//! ```
+//! use toposlam_link::merge::{MergeError, merge};
+//! use toposlam_link::topology::TopologicalMap;
+//!
+//! assert_eq!(merge(&TopologicalMap::default(), &TopologicalMap::default()), Err(MergeError::NoWays));
+//! ```
+
+mod alignment;
+mod evidence;
+mod folding;
+#[cfg(test)]
+mod tests;
+
+use std::collections::BTreeMap;
+use std::fmt;
+
+use alignment::Alignment;
+use evidence::Background;
+pub use evidence::Evidence;
+
+use crate::topology::TopologicalMap;
+
+/// An alignment with a smaller probability is refused.
+const LEAST_PROBABILITY: f64 = 0.99;
+/// So is one with less evidence, in nats.
+const LEAST_NATS: f64 = 10.0;
+/// So is one when an alignment that contradicts it has a larger share of its evidence: the building repeats itself, and evidence of
+/// vertices side by side is then not independent.
+const RIVAL_SHARE: f64 = 0.5;
+/// The most vertices of a merged map: those of the wire protocol.
+const VERTICES_MAX: usize = 64;
+
+/// A merged map, and what it was merged by.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Merged {
+    /// The map: the vertices of the first with their numbers, then those that only the second has.
+    pub map: TopologicalMap,
+    /// The vertices that both maps have, as numbers in the first and in the second.
+    pub common: Vec<(u8, u8)>,
+    /// The parts in common with their evidence, the one that was found first at the front.
+    pub parts: Vec<Part>,
+}
+
+/// A part that both maps have.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Part {
+    /// Its vertices, as numbers in the first map and in the second.
+    pub common: Vec<(u8, u8)>,
+    /// The evidence for and against it.
+    pub evidence: Evidence,
+    /// The evidence of the best alignment that contradicts it, in nats; `None` without any.
+    pub rival_nats: Option<f64>,
+    /// The probability of the alignment, 0 to 1.
+    pub probability: f64,
+}
+
+/// Why two maps were not merged.
+#[derive(Clone, Debug, PartialEq)]
+pub enum MergeError {
+    /// A map has no ways: only the maps of the ordered filter have them.
+    NoWays,
+    /// No vertex of one map is like one of the other.
+    NothingInCommon,
+    /// The best alignment is not certain enough, or contradicts itself: then one of the maps is wrong. It is reported with its
+    /// evidence.
+    Uncertain(Box<Part>),
+    /// The merged map would have more vertices than a robot's map can have.
+    TooManyVertices(usize),
+}
+
+impl fmt::Display for MergeError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::NoWays => f.write_str("a map has no ways; only the maps of the ordered filter can be merged"),
+            Self::NothingInCommon => f.write_str("the maps have nothing in common"),
+            Self::Uncertain(part) => write!(f, "the common part is not certain, or one of the maps is wrong: {part}"),
+            Self::TooManyVertices(count) => {
+                write!(f, "the merged map would have {count} vertices, but a map has at most {VERTICES_MAX}")
+            }
+        }
+    }
+}
+
+impl std::error::Error for MergeError {}
+
+impl Part {
+    fn is_certain(&self) -> bool {
+        let nats = self.evidence.total();
+        self.probability >= LEAST_PROBABILITY
+            && nats >= LEAST_NATS
+            && self.rival_nats.is_none_or(|rival_nats| rival_nats <= RIVAL_SHARE * nats)
+            && self.evidence.contradictions == 0
+    }
+}
+
+impl fmt::Display for Part {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let percent = 100.0 * self.probability;
+        write!(f, "{} vertices, probability {percent:.1} %, {}", self.common.len(), self.evidence)?;
+        match self.rival_nats {
+            Some(nats) => write!(f, "; the best alternative has {nats:.1} nats"),
+            None => f.write_str("; no alternative"),
+        }
+    }
+}
+
+/// Merges two maps of one building.
+///
+/// Cost: O(D² · V) for maps of V vertices and D ways, but most alignments end after a few vertices.
+///
+/// # Errors
+/// [`MergeError`] when the maps cannot be merged, or have no common part that is certain.
+pub fn merge(first: &TopologicalMap, second: &TopologicalMap) -> Result<Merged, MergeError> {
+    if first.ways.is_empty() || second.ways.is_empty() {
+        return Err(MergeError::NoWays);
+    }
+    let background = Background::of(first, second);
+    let alignments = alignments(first, second, &background);
+    let mut whole = Alignment::default();
+    let mut parts = Vec::new();
+    while let Some((alignment, part)) = best(&alignments, &whole) {
+        let joined = whole.with(alignment);
+        let genus = folding::genus(&folding::fold(first, second, &joined));
+        let is_planar = genus <= folding::genus(first).max(folding::genus(second));
+        if part.is_certain() && is_planar {
+            whole = joined;
+            parts.push(part);
+        } else if parts.is_empty() {
+            return Err(MergeError::Uncertain(Box::new(part)));
+        } else {
+            break;
+        }
+    }
+    if parts.is_empty() {
+        return Err(MergeError::NothingInCommon);
+    }
+    let map = folding::fold(first, second, &whole);
+    if map.vertices.len() > VERTICES_MAX {
+        return Err(MergeError::TooManyVertices(map.vertices.len()));
+    }
+    Ok(Merged { map, common: whole.vertex_pairs(), parts })
+}
+
+/// All different alignments with a positive score.
+fn alignments(first: &TopologicalMap, second: &TopologicalMap, background: &Background) -> Vec<Alignment> {
+    let mut different: BTreeMap<Vec<(u8, u8)>, Alignment> = BTreeMap::new();
+    for (way, _) in first.all_ways() {
+        for (other, _) in second.all_ways() {
+            let alignment = Alignment::from_pair(first, second, background, way, other);
+            if alignment.evidence.total() > 0.0 {
+                let known = different.entry(alignment.vertex_pairs()).or_insert_with(|| alignment.clone());
+                if known.evidence.total() < alignment.evidence.total() {
+                    *known = alignment;
+                }
+            }
+        }
+    }
+    different.into_values().collect()
+}
+
+/// The best alignment of the vertices that are not merged yet, with its probability.
+fn best<'a>(alignments: &'a [Alignment], whole: &Alignment) -> Option<(&'a Alignment, Part)> {
+    let open: Vec<&Alignment> = alignments.iter().filter(|alignment| alignment.is_disjoint_from(whole)).collect();
+    let score = |alignment: &Alignment| alignment.evidence.total();
+    let best = *open.iter().max_by(|a, b| score(a).total_cmp(&score(b)))?;
+    let rivals = || open.iter().filter(|rival| best.contradicts(rival));
+    let rival_nats = rivals().map(|rival| score(rival)).max_by(f64::total_cmp);
+    // Each alignment, and together as much as any of them that there is no common part: all equally probable before.
+    let against: f64 = rivals().map(|rival| (score(rival) - score(best)).exp()).sum();
+    let unrelated = open.len() as f64 * (-score(best)).exp();
+    let probability = 1.0 / (1.0 + against + unrelated);
+    Some((best, Part { common: best.vertex_pairs(), evidence: best.evidence, rival_nats, probability }))
+}

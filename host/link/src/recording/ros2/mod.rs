@@ -1,0 +1,203 @@
+//! Recordings of a robot's line as ROS 2 bags: a folder with an MCAP file and its `metadata.yaml`.
+//!
+//! No part of ROS is needed to write them. `docs/ros2.md` lists the topics.
+
+mod cdr;
+mod messages;
+
+use std::collections::BTreeMap;
+use std::fs::{self, File};
+use std::io::{BufWriter, Write};
+use std::path::{Path, PathBuf};
+
+use mcap::{WriteOptions, Writer, records::MessageHeader, write::NoSeek};
+use toposlam::wire::Message;
+
+use super::{RecordingError, Summary};
+use crate::export;
+use crate::layout::Layout;
+use crate::listener::{Event, Listener};
+use crate::topology::TopologicalMap;
+
+/// Minimum interval between two drawings of the map.
+const DRAWING_PERIOD_NS: u64 = 100_000_000;
+
+/// A topic, its message type, the definition of the type, and the number of its messages.
+struct Topic {
+    name: &'static str,
+    message: &'static str,
+    definition: &'static str,
+}
+
+const SCAN: usize = 0;
+const MAP: usize = 1;
+const ROUTE: usize = 2;
+const TOPICS: [Topic; 3] = [
+    Topic {
+        name: "/toposlam/scan",
+        message: "sensor_msgs/msg/LaserScan",
+        definition: include_str!("definitions/LaserScan.msg"),
+    },
+    Topic {
+        name: "/toposlam/map",
+        message: "visualization_msgs/msg/MarkerArray",
+        definition: include_str!("definitions/MarkerArray.msg"),
+    },
+    Topic { name: "/toposlam/route_graph", message: "std_msgs/msg/String", definition: "string data\n" },
+];
+
+/// Writes a robot's stream to a ROS 2 bag.
+pub struct Ros2Bag {
+    folder: PathBuf,
+    file: Writer<NoSeek<BufWriter<File>>>,
+    channels: [u16; TOPICS.len()],
+    counts: [u32; TOPICS.len()],
+    /// Times of the first and the last message.
+    span_ns: Option<(u64, u64)>,
+    listener: Listener,
+    layout: Layout,
+    /// The map in its last drawing with the vertex of the robot, and the time of the drawing.
+    drawn: Option<(TopologicalMap, Option<u8>, u64)>,
+    frame_mm: Option<f64>,
+    summary: Summary,
+}
+
+impl Ros2Bag {
+    /// Creates a folder with the name of the bag.
+    ///
+    /// `frame_mm` is how far the robot drives in a ring frame, for the costs of the route graph ([`export::geojson`]).
+    ///
+    /// # Errors
+    /// If the folder exists or cannot be written.
+    pub fn create(folder: &Path, frame_mm: Option<f64>) -> Result<Self, RecordingError> {
+        fs::create_dir(folder)?;
+        let output = BufWriter::new(File::create_new(folder.join(file_name(folder)))?);
+        let options = WriteOptions::new()
+            .profile("ros2")
+            .library(concat!("toposlam ", env!("CARGO_PKG_VERSION")))
+            .disable_seeking(true);
+        let mut file = options.create(NoSeek::new(output))?;
+        let mut channels = [0; TOPICS.len()];
+        for (channel, topic) in channels.iter_mut().zip(&TOPICS) {
+            let schema = file.add_schema(topic.message, "ros2msg", topic.definition.as_bytes())?;
+            let metadata = BTreeMap::from([("offered_qos_profiles".to_owned(), String::new())]);
+            *channel = file.add_channel(schema, topic.name, "cdr", &metadata)?;
+        }
+        Ok(Self {
+            folder: folder.to_owned(),
+            file,
+            channels,
+            counts: [0; TOPICS.len()],
+            span_ns: None,
+            listener: Listener::new(),
+            layout: Layout::new(),
+            drawn: None,
+            frame_mm,
+            summary: Summary::default(),
+        })
+    }
+
+    /// Records bytes in pieces of any length. `time_ns` is their time of arrival in nanoseconds since 1970.
+    ///
+    /// # Errors
+    /// If the file cannot be written.
+    pub fn record(&mut self, bytes: &[u8], time_ns: u64) -> Result<(), RecordingError> {
+        let mut scans = Vec::new();
+        let Self { listener, layout, summary, .. } = self;
+        listener.feed(bytes, |_, event| {
+            let Event::Message(header, message) = event else { return };
+            summary.frames = summary.frames.wrapping_add(1);
+            layout.apply(header, message);
+            match message {
+                Message::Ring { echoes, .. } => scans.push(messages::scan(echoes, time_ns)),
+                Message::Place { .. } => summary.places += 1,
+                _ => {}
+            }
+        });
+        self.summary.bytes += bytes.len() as u64;
+        for scan in scans {
+            self.write(SCAN, time_ns, &scan)?;
+        }
+        let is_soon = |(_, _, drawn_ns): &(_, _, u64)| time_ns.saturating_sub(*drawn_ns) < DRAWING_PERIOD_NS;
+        if self.drawn.as_ref().is_some_and(is_soon) { Ok(()) } else { self.draw(time_ns) }
+    }
+
+    fn draw(&mut self, time_ns: u64) -> Result<(), RecordingError> {
+        let map = self.listener.map();
+        let here = self.listener.replica().location().map(|location| location.vertex);
+        if map.vertices.is_empty()
+            || self.drawn.as_ref().is_some_and(|(drawn, robot, _)| *drawn == map && *robot == here)
+        {
+            return Ok(());
+        }
+        self.layout.arrange(&map);
+        let markers = messages::markers(&map, &self.layout, here, time_ns);
+        let route = export::geojson(&map, &self.layout, here, super::METRES_PER_EDGE, self.frame_mm);
+        self.write(MAP, time_ns, &markers)?;
+        self.write(ROUTE, time_ns, &messages::string(&route))?;
+        self.drawn = Some((map, here, time_ns));
+        Ok(())
+    }
+
+    fn write(&mut self, topic: usize, time_ns: u64, data: &[u8]) -> Result<(), RecordingError> {
+        let sequence = self.counts[topic];
+        let header =
+            MessageHeader { channel_id: self.channels[topic], sequence, log_time: time_ns, publish_time: time_ns };
+        self.counts[topic] = sequence.wrapping_add(1);
+        let (first_ns, last_ns) = self.span_ns.unwrap_or((time_ns, time_ns));
+        self.span_ns = Some((first_ns.min(time_ns), last_ns.max(time_ns)));
+        Ok(self.file.write_to_known_channel(&header, data)?)
+    }
+
+    /// The counts so far.
+    pub const fn summary(&self) -> Summary {
+        self.summary
+    }
+
+    /// Writes the remaining data and `metadata.yaml`.
+    ///
+    /// # Errors
+    /// If the folder cannot be written.
+    pub fn finish(mut self) -> Result<Summary, RecordingError> {
+        if let Some((_, last_ns)) = self.span_ns {
+            self.draw(last_ns)?;
+        }
+        self.file.finish()?;
+        let metadata = self.metadata();
+        self.file.into_inner().into_inner().flush()?;
+        fs::write(self.folder.join("metadata.yaml"), metadata)?;
+        Ok(self.summary)
+    }
+
+    /// `metadata.yaml` in version 5 of rosbag2, which Humble and all later distributions read.
+    fn metadata(&self) -> String {
+        let (first_ns, last_ns) = self.span_ns.unwrap_or((0, 0));
+        let (duration_ns, count) = (last_ns - first_ns, self.counts.iter().sum::<u32>());
+        let name = file_name(&self.folder);
+        let topics: String = TOPICS
+            .iter()
+            .zip(self.counts)
+            .map(|(topic, count)| {
+                let Topic { name, message, .. } = topic;
+                format!(
+                    "    - topic_metadata:\n        name: {name}\n        type: {message}\n        \
+                     serialization_format: cdr\n        offered_qos_profiles: \"\"\n      message_count: {count}\n"
+                )
+            })
+            .collect();
+        format!(
+            "rosbag2_bagfile_information:\n  version: 5\n  storage_identifier: mcap\n  duration:\n    \
+             nanoseconds: {duration_ns}\n  starting_time:\n    nanoseconds_since_epoch: {first_ns}\n  \
+             message_count: {count}\n  topics_with_message_count:\n{topics}  compression_format: \"\"\n  \
+             compression_mode: \"\"\n  relative_file_paths:\n    - {name:?}\n  files:\n    - path: {name:?}\n      \
+             starting_time:\n        nanoseconds_since_epoch: {first_ns}\n      duration:\n        \
+             nanoseconds: {duration_ns}\n      message_count: {count}\n"
+        )
+    }
+}
+
+/// The name of the MCAP file in the folder of a bag.
+fn file_name(folder: &Path) -> String {
+    let name = folder.file_name().unwrap_or(folder.as_os_str());
+    format!("{}_0.mcap", name.to_string_lossy())
+}
