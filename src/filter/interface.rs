@@ -48,7 +48,7 @@ pub trait Filter<const V: usize>: Sized {
     /// [`ConfigError`] names the first field that is out of its range; the filter does not change then.
     fn set_config(&mut self, config: Self::Config) -> Result<(), ConfigError>;
 
-    /// Takes the next place and publishes the best map.
+    /// Takes the next place and publishes the best map. Without [`Filter::refine`] between two places the map is rarely right.
     fn observe(&mut self, observation: impl Into<Observation>) -> Update;
 
     /// Runs one refinement step, in the time between two places. The next [`Filter::observe`] publishes the result. A filter

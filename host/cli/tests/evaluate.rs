@@ -211,18 +211,31 @@ fn distinct_places_are_mapped_exactly_with_a_high_vertex_penalty() {
 }
 
 #[test]
+fn walks_that_never_turn_back_do_not_fold_a_building_onto_two_places() {
+    let environments = ["--environment", "environments/office.toml", "environments/ring.toml"];
+    let walks = ["--walk", "forward", "--paths", "8", "--lengths", "100"];
+    let report = report(&[environments.as_slice(), &walks].concat(), "2");
+    for (row, exact) in report["rows"].as_array().unwrap().iter().zip([0.9, 0.6]) {
+        assert!(row["exact"].as_f64().unwrap() >= exact, "{row}");
+        // No map of two vertices.
+        assert!(row["vertices"].as_object().unwrap().keys().all(|vertices| vertices.parse::<u32>().unwrap() >= 8));
+    }
+}
+
+#[test]
 fn the_table_shows_the_seed_and_names_every_row() {
     let arguments = ["--environment", TABLE_I, "--family", FAMILY, "--paths", "1", "--lengths", "4,8", "--seed", "5"];
     let output = evaluate(&[arguments.as_slice(), &["--format", "table"]].concat(), "1");
     let table = String::from_utf8(output.stdout).unwrap();
     let lines: Vec<&str> = table.lines().collect();
-    assert_eq!(lines.len(), 6);
+    assert_eq!(lines.len(), 7);
     assert!(lines[0].starts_with(
         "seed 5, walk uniform, prior none, hints none, 12 bits, n = 5, 10 refinement steps; robust: hypotheses 10"
     ));
     assert!(lines[1].starts_with("name "));
     assert!(lines[2].starts_with("table-i ") && lines[3].starts_with("table-i "));
     assert!(lines[5].starts_with(&format!("family {FAMILY} robust")));
+    assert!(lines[6].starts_with("robust filter: stated probability of the map, share exact (maps): "));
 }
 
 #[test]

@@ -24,7 +24,7 @@ const FOLDS_POWER: f32 = 0.5;
 pub(crate) struct Trials {
     /// The places observed since then.
     pub(crate) places: u16,
-    /// The folds since then that led to the best map, and those that led to another map.
+    /// The folds since then, with the noise of the model, that led to the best map, and those that led to another map.
     pub(crate) found: u8,
     pub(crate) missed: u8,
 }

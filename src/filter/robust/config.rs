@@ -1,6 +1,7 @@
 //! The parameters of the robust filter.
 
 use crate::config_error::ConfigError;
+use crate::place::Fingerprint;
 use crate::setters::setters;
 
 /// The parameters of the robust filter. The defaults were chosen on random families of environments (docs/evaluation.md).
@@ -52,6 +53,11 @@ impl RobustConfig {
         wrong_turn_permille: 0,
         wrong_degree_permille: 0,
     };
+
+    /// The resolution of the fingerprints in steps.
+    pub(super) fn resolution_steps(&self) -> f32 {
+        f32::from(self.resolution_mm) / f32::from(Fingerprint::STEP_MM)
+    }
 
     /// Checks every field for a filter with room for `capacity` hypotheses.
     ///

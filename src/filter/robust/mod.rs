@@ -173,6 +173,29 @@ impl<const N: usize, const V: usize, const HISTORY: usize> RobustFilter<N, V, HI
         self.publish()
     }
 
+    /// Adopts the noise that follows from the draft if with it the draft is better than the best hypothesis with that of the model; else
+    /// computes the evidence of the draft with the latter.
+    fn compare_with_own_noise(&mut self) {
+        let mut own = self.model.clone();
+        if let Some(noise) = noise::deviation_steps(&self.history, &self.draft, self.config.resolution_steps()) {
+            own.set_noise(noise);
+        }
+        self.draft.evidence = self.draft.total(&own);
+        if self.beam.best().is_some_and(|best| self.draft.score() > best.score()) {
+            self.set_noise(own.noise_steps());
+        } else {
+            self.draft.evidence = self.draft.total(&self.model);
+        }
+    }
+
+    /// Sets the standard deviation of a label, in steps, and computes the evidence of all hypotheses with it.
+    fn set_noise(&mut self, deviation_steps: f32) {
+        self.model.set_noise(deviation_steps);
+        let model = &self.model;
+        self.beam.for_each(|hypothesis| hypothesis.evidence = hypothesis.total(model));
+        self.beam.sort();
+    }
+
     /// Inserts the draft into the beam, and notes if its map is the best one now.
     fn insert_draft(&mut self) {
         let best_key = |beam: &Beam<N, V, HISTORY>| beam.best().map(|best| best.map_alone_key());
@@ -276,16 +299,21 @@ impl<const N: usize, const V: usize, const HISTORY: usize> Filter<V> for RobustF
             if !self.fold.is_running() {
                 self.fold.start(&self.model, &self.history, hypothesis, proposals.random);
             }
-            if self.fold.step(&self.model, &self.history, V, proposals.random) != Progress::Done {
+            if self.fold.step(&self.history, V, proposals.random) != Progress::Done {
                 return;
             }
             self.draft.clone_from(hypothesis);
             self.fold.write(&self.history, &mut self.draft);
-            if proposals.finish(&mut self.draft) {
+            if let Some(own) = self.fold.own_model() {
+                Proposals { model: own, threshold: f32::NEG_INFINITY, ..proposals }.finish(&mut self.draft);
+                self.compare_with_own_noise();
+            } else if proposals.finish(&mut self.draft) {
                 let key = self.draft.map_alone_key();
                 self.trials.add_fold(self.beam.best().is_some_and(|best| best.map_alone_key() == key));
-                self.insert_draft();
+            } else {
+                return;
             }
+            self.insert_draft();
             return;
         }
         self.draft.clone_from(hypothesis);

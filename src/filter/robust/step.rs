@@ -5,7 +5,6 @@ use crate::fault::FaultKind;
 use crate::filter::Observation;
 use crate::filter::beam::Ranked as _;
 use crate::filter::{Filter, Update};
-use crate::place::Fingerprint;
 
 /// The noise is estimated from this place on.
 const NOISE_FROM: u32 = 10;
@@ -106,14 +105,11 @@ impl<const N: usize, const V: usize, const HISTORY: usize> RobustFilter<N, V, HI
         if self.localise_only || self.observed < NOISE_FROM || !self.observed.is_multiple_of(interval) {
             return;
         }
-        let resolution = f32::from(self.config.resolution_mm) / f32::from(Fingerprint::STEP_MM);
-        let Some(deviation) = self.beam.best().and_then(|best| noise::deviation_steps(&self.history, best, resolution))
-        else {
-            return;
-        };
-        self.model.set_noise(deviation);
-        let model = &self.model;
-        self.beam.for_each(|hypothesis| hypothesis.evidence = hypothesis.total(model));
-        self.beam.sort();
+        let resolution = self.config.resolution_steps();
+        if let Some(deviation) =
+            self.beam.best().and_then(|best| noise::deviation_steps(&self.history, best, resolution))
+        {
+            self.set_noise(deviation);
+        }
     }
 }

@@ -1,5 +1,6 @@
-//! Categories of labels: vertices of a hypothesis whose labels are alike.
+//! Categories of labels: vertices of a hypothesis whose labels are alike, or the labels of a history.
 
+use crate::filter::robust::history::ObservationHistory;
 use crate::filter::robust::hypothesis::Hypothesis;
 use crate::filter::robust::model::Model;
 use crate::map::{PerVertex, VertexId};
@@ -12,6 +13,9 @@ const PRIOR_VISITS: f32 = 4.0;
 
 /// The standard deviations by which vertices of few visits may be farther apart.
 const UNCERTAINTY: f32 = 0.5;
+
+/// How often labels are assigned to the nearest mean.
+const PARTITIONS: usize = 2;
 
 /// The number of a category.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -118,17 +122,69 @@ impl Categories {
                 categories[first] = categories[group[first]];
                 continue;
             }
-            let category = Category(self.len);
-            categories[first] = category;
+            categories[first] = Category(self.len);
             let held = &statistics[first];
-            let variance = (held.scatter + PRIOR_VISITS * noise * noise) / (f32::from(held.visits) + PRIOR_VISITS);
-            self.densities[category.index()] = Density {
-                mean: libm::roundf(held.mean),
-                half_precision: 0.5 / variance,
-                constant: -0.5 * libm::logf(variance),
-            };
-            self.len += 1;
+            self.add(held.mean, held.scatter, held.visits.into(), noise);
         }
         categories
     }
+
+    /// Adds a category.
+    fn add(&mut self, mean: f32, scatter: f32, visits: f32, noise: f32) {
+        let variance = (scatter + PRIOR_VISITS * noise * noise) / (visits + PRIOR_VISITS);
+        self.densities[Category(self.len).index()] =
+            Density { mean: libm::roundf(mean), half_precision: 0.5 / variance, constant: -0.5 * libm::logf(variance) };
+        self.len += 1;
+    }
+
+    /// Partitions the labels of a history: the smallest ones up to `2 · reach` standard deviations of the noise apart, then the next ones,
+    /// and so on. Then each label joins the category with the nearest mean, twice (Lloyd). Cost: O(T · categories).
+    pub(super) fn find_in<const T: usize>(&mut self, model: &Model, history: &ObservationHistory<T>, reach: f32) {
+        let noise = model.noise_steps();
+        let labels = || history.iter().map(|observation| f32::from(observation.steps));
+        let mut means = [0.0; CATEGORIES];
+        let mut len = 0;
+        let mut above = f32::NEG_INFINITY;
+        for mean in &mut means {
+            let least = labels().filter(|&label| label > above).fold(f32::INFINITY, f32::min);
+            if least == f32::INFINITY {
+                break;
+            }
+            above = least + 2.0 * reach * noise;
+            *mean = mean_of(labels().filter(|&label| label >= least && label <= above));
+            len += 1;
+        }
+        let mut sums = [(0.0, 0.0, 0.0); CATEGORIES];
+        for _ in 0..PARTITIONS {
+            sums = [(0.0, 0.0, 0.0); CATEGORIES];
+            for label in labels() {
+                let mut nearest = (f32::INFINITY, 0);
+                for (number, mean) in means.iter().enumerate().take(len) {
+                    let off = (label - mean).abs();
+                    if off < nearest.0 {
+                        nearest = (off, number);
+                    }
+                }
+                if let (Some((visits, sum, squares)), Some(mean)) = (sums.get_mut(nearest.1), means.get(nearest.1)) {
+                    *visits += 1.0;
+                    *sum += label - mean;
+                    *squares += nearest.0 * nearest.0;
+                }
+            }
+            for (mean, (visits, sum, _)) in means.iter_mut().zip(&sums) {
+                *mean += if *visits > 0.0 { sum / visits } else { 0.0 };
+            }
+        }
+        self.len = 0;
+        for (mean, (visits, sum, squares)) in means.into_iter().zip(sums).take(len) {
+            // The squares are about the mean before.
+            self.add(mean, (squares - sum * sum / visits.max(1.0)).max(0.0), visits, noise);
+        }
+    }
+}
+
+/// The mean of some labels.
+fn mean_of(labels: impl Iterator<Item = f32>) -> f32 {
+    let (sum, count) = labels.fold((0.0, 0.0), |(sum, count), label| (sum + label, count + 1.0_f32));
+    sum / count.max(1.0)
 }

@@ -34,6 +34,13 @@ const NODES_LEFT: u8 = 96;
 const REACHES: [f32; 3] = [1.5, 2.0, 2.5];
 /// What a label gains that has the category it has on the map of the hypothesis, in nats.
 const INCUMBENTS: [f32; 3] = [4.0, 8.0, 1000.0];
+/// The noise of a fold that starts from the labels alone, as a share of that of the model. Where the search is stuck in a map that folds
+/// places with other labels onto each other, the noise that follows from this map is too large.
+const NOISES: [f32; 3] = [1.0, 0.4, 0.16];
+/// One of this many folds starts from the labels alone.
+const FRESH_EVERY: u32 = 4;
+/// The least noise of a fold, in steps.
+const NOISE_MIN: f32 = 2.0;
 /// The temperature of the draw among merges by their gain.
 const TEMPERATURES: [f32; 3] = [0.0, 1.0, 2.0];
 
@@ -43,7 +50,10 @@ pub(crate) struct Fold<const T: usize> {
     is_running: bool,
     /// Whether the fold has ended; the next step reports it.
     has_ended: bool,
+    /// Whether it started from the labels alone, with a noise of its own.
+    is_fresh: bool,
     temperature: f32,
+    model: Model,
     categories: Categories,
     automaton: Automaton,
     /// The node of each of the first `placed` places of the history, then the category of each place up to `known`.
@@ -71,7 +81,9 @@ impl<const T: usize> Fold<T> {
         Self {
             is_running: false,
             has_ended: false,
+            is_fresh: false,
             temperature: 0.0,
+            model: Model::new(),
             categories: Categories::new(),
             automaton: Automaton::new(),
             nodes: [0; T],
@@ -92,7 +104,12 @@ impl<const T: usize> Fold<T> {
         self.is_running = false;
     }
 
-    /// Starts a fold of the history, with the categories of a hypothesis. Cost: O(V³ + T).
+    /// The model of a fold with a noise of its own.
+    pub(super) fn own_model(&self) -> Option<&Model> {
+        Some(&self.model).filter(|_| self.is_fresh)
+    }
+
+    /// Starts a fold of the history, with the categories of a hypothesis or from the labels alone. Cost: O(V³ + T · categories).
     pub(super) fn start<const V: usize>(
         &mut self,
         model: &Model,
@@ -104,20 +121,29 @@ impl<const T: usize> Fold<T> {
         let reach = one_of(REACHES);
         self.incumbent = one_of(INCUMBENTS);
         self.temperature = one_of(TEMPERATURES);
-        let categories = self.categories.find(model, hypothesis, reach);
-        for (slot, &vertex) in self.nodes.iter_mut().zip(&hypothesis.path) {
-            *slot = categories[vertex].index() as u8;
+        let share = one_of(NOISES);
+        self.model.clone_from(model);
+        self.is_fresh = random.next_u32().is_multiple_of(FRESH_EVERY);
+        if self.is_fresh {
+            self.model.set_noise((share * model.noise_steps()).max(NOISE_MIN));
+            self.incumbent = 0.0;
+            self.categories.find_in(&self.model, history, reach);
+        } else {
+            let categories = self.categories.find(model, hypothesis, reach);
+            for (slot, &vertex) in self.nodes.iter_mut().zip(&hypothesis.path) {
+                *slot = categories[vertex].index() as u8;
+            }
         }
         self.known = history.len();
         self.placed = 0;
         self.automaton.clear();
-        self.grow(model, history);
+        self.grow(history);
         self.is_running = true;
         self.has_ended = false;
     }
 
     /// Adds places to the tree while there is room for nodes. Cost: O(T · categories).
-    fn grow(&mut self, model: &Model, history: &ObservationHistory<T>) {
+    fn grow(&mut self, history: &ObservationHistory<T>) {
         let mut at = self.placed.checked_sub(1).and_then(|last| self.nodes.get(last)).copied();
         let places = history.iter().zip(&mut self.nodes).take(self.known).skip(self.placed);
         for (observation, slot) in places {
@@ -145,23 +171,22 @@ impl<const T: usize> Fold<T> {
             at = Some(node);
             self.placed += 1;
         }
-        self.automaton.score_all(model);
+        self.automaton.score_all(&self.model);
         self.pair = (0, 1);
         self.best = None;
     }
 
     /// Makes one node of each class and adds more places.
-    fn grow_again(&mut self, model: &Model, history: &ObservationHistory<T>) {
+    fn grow_again(&mut self, history: &ObservationHistory<T>) {
         let mut renamed = PerNode::filled(NONE);
         self.automaton.compact(&mut renamed);
         self.nodes.iter_mut().take(self.placed).for_each(|node| *node = renamed[*node]);
-        self.grow(model, history);
+        self.grow(history);
     }
 
     /// Tries some merges. A sweep tries all pairs of a category and makes the best merge.
     pub(super) fn step(
         &mut self,
-        model: &Model,
         history: &ObservationHistory<T>,
         vertices: usize,
         random: &mut Xoshiro128PlusPlus,
@@ -181,12 +206,12 @@ impl<const T: usize> Fold<T> {
                 self.pair = (0, 1);
                 let best = self.best.take();
                 if let Some((_, a, b)) = best {
-                    work += MERGE_WORK * self.automaton.merge(model, a, b).1;
-                    self.automaton.commit(model);
+                    work += MERGE_WORK * self.automaton.merge(&self.model, a, b).1;
+                    self.automaton.commit(&self.model);
                 }
                 let has_room = self.automaton.classes() <= if best.is_some() { NODES_LEFT } else { NODES as u8 - 1 };
                 if self.placed < self.known && has_room {
-                    self.grow_again(model, history);
+                    self.grow_again(history);
                 } else if best.is_none() {
                     self.has_ended = true;
                     return Progress::Running;
@@ -203,7 +228,7 @@ impl<const T: usize> Fold<T> {
             {
                 continue;
             }
-            let (gain, merged) = self.automaton.merge(model, first, second);
+            let (gain, merged) = self.automaton.merge(&self.model, first, second);
             self.automaton.undo();
             work += MERGE_WORK * merged;
             let has_to_merge = self.placed == self.known && usize::from(self.automaton.classes()) > vertices;

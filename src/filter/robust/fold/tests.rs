@@ -1,9 +1,12 @@
 //! Properties of merges, against a reference in f64 that computes everything again from the nodes.
 
 use super::automaton::{Automaton, NODES, Node, PerNode};
-use super::categories::Category;
+use super::categories::{Categories, Category};
+use crate::filter::Observation;
 use crate::filter::RobustConfig;
+use crate::filter::robust::history::ObservationHistory;
 use crate::filter::robust::model::Model;
+use crate::place::Fingerprint;
 use rand_core::{Rng, SeedableRng};
 use rand_xoshiro::Xoshiro128PlusPlus;
 use std::collections::{BTreeMap, BTreeSet};
@@ -216,5 +219,23 @@ fn compaction_keeps_classes_and_edges() {
                 assert_eq!(tree.automaton.neighbour(renamed[class], category), Some(renamed[neighbour]));
             }
         }
+    }
+}
+
+#[test]
+fn labels_alone_are_partitioned_into_groups_that_noise_explains() {
+    let mut model = Model::new();
+    model.configure(&RobustConfig::DEFAULT.with_noise_mm(10));
+    let mut history = ObservationHistory::<64>::new();
+    for visit in 0..60 {
+        let radius_mm = [1000, 1100, 1260, 1500][visit % 4] + (visit * 7 % 25) as u16;
+        history.push(&Observation::from(Fingerprint::from_radius_mm(radius_mm).unwrap()));
+    }
+    let mut categories = Categories::new();
+    categories.find_in(&model, &history, 2.0);
+    let means: Vec<f32> = Category::all().map(|category| categories.mean(category) * 2.0).take(4).collect();
+    assert_eq!(categories.ln_densities(500).count(), 4);
+    for (mean, radius_mm) in means.iter().zip([1012.0, 1112.0, 1272.0, 1512.0]) {
+        assert!((mean - radius_mm).abs() < 6.0, "{means:?}");
     }
 }
