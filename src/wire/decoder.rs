@@ -117,7 +117,9 @@ pub struct Decoder<M = Message> {
     last_sequence: Option<u16>,
     /// Whether the line was reopened after the last message.
     reopened: bool,
-    start: Option<Start>,
+    /// Whether the start of the sender is known, and which. A `None` is not all zero and would move a `static` decoder out of `.bss`.
+    knows_start: bool,
+    start: Start,
     clocks: Clocks,
     counters: DecoderCounters,
     hands_out: PhantomData<fn() -> M>,
@@ -137,7 +139,8 @@ impl<M: Payload> Decoder<M> {
             too_long: false,
             last_sequence: None,
             reopened: false,
-            start: None,
+            knows_start: false,
+            start: Start::NONE,
             clocks: Clocks::NONE,
             counters: DecoderCounters {
                 messages: 0,
@@ -268,7 +271,10 @@ impl<M: Payload> Decoder<M> {
 
     fn arrival(&mut self, sequence: u16, message: &M) -> Arrival {
         let has_other_start = match message.start() {
-            Some(start) => self.start.replace(start).is_some_and(|last| last != start),
+            Some(start) => {
+                let last = core::mem::replace(&mut self.start, start);
+                core::mem::replace(&mut self.knows_start, true) && last != start
+            }
             None => false,
         };
         let is_reopened = core::mem::take(&mut self.reopened);
@@ -292,7 +298,8 @@ impl<M: Payload> Decoder<M> {
                 bump(&mut self.counters.restarts, 1);
                 self.clocks = Clocks::NONE;
                 // The next Hello is that of the new start.
-                self.start = message.start();
+                self.knows_start = message.start().is_some();
+                self.start = message.start().unwrap_or(Start::NONE);
             }
             Arrival::First | Arrival::InOrder | Arrival::Late => {}
         }

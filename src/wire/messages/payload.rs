@@ -31,6 +31,11 @@ pub struct Start {
     pub seed: u64,
 }
 
+impl Start {
+    /// All zero.
+    pub(in crate::wire) const NONE: Self = Self { session: 0, boot: 0, reset_cause: ResetCause::Unknown, seed: 0 };
+}
+
 /// A number that ascends from the start of a robot on. It wraps.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Clock {

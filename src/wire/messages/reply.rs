@@ -15,8 +15,10 @@ pub struct Reply {
 }
 
 /// The outcome of a request. Append-only.
+// The tag of `Done` is 0, so that a `static` robot is in `.bss`; the compiler's own choice depends on the variants.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[non_exhaustive]
+#[repr(u8)]
 pub enum Outcome {
     /// The command was accepted.
     Done,
