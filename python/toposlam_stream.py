@@ -37,9 +37,9 @@ from typing import Annotated, Any, Callable, Iterable, Iterator, Optional, Union
 
 FRAME_VERSION = 2
 """The first byte of every frame of a robot; in a frame to a robot 128 is added."""
-PROTOCOL_VERSION = 5
+PROTOCOL_VERSION = 6
 """The version of the messages."""
-SCHEMA_HASH = 0x8409_EFC8_CE2D_743A
+SCHEMA_HASH = 0x3BC2_F178_DFCA_A82F
 """The 64-bit FNV-1a hash of the schema in `docs/wire.md`."""
 CHUNK_BYTES = 64
 """The most bytes of a snapshot in one request or reply."""
@@ -156,6 +156,18 @@ def _optional(codec: _Codec) -> _Codec:
             codec.write(value, out)
 
     return _Codec(read, write)
+
+
+def _or_zero(codec: _Codec) -> _Codec:
+    """The last number of a payload; 0 if an older sender leaves it out."""
+
+    def read(payload: bytes, at: int) -> tuple[int, int]:
+        try:
+            return codec.read(payload, at)
+        except (_UnknownPayload, IndexError):
+            return 0, len(payload)
+
+    return _Codec(read, codec.write)
 
 
 def _list(codec: _Codec, most: int, build: Callable[[Iterable[Any]], Any] = tuple) -> _Codec:
@@ -311,6 +323,7 @@ class Refusal(enum.IntEnum):
     BAD_CRC = 9
     BAD_SNAPSHOT = 10
     BUSY = 11
+    RECORDING = 12
 
     @classmethod
     def _missing_(cls, value: object) -> Refusal:
@@ -336,10 +349,16 @@ class Hello:
     protocol_version: U16
     schema_hash: U64
     boot: U32
-    """Differs from one start of the robot to the next; 0 if it has no such number."""
+    """The number of the start; 0 if the robot does not count them."""
     reset_cause: Annotated[ResetCause, _kind(ResetCause)]
     seed: U64
     capacities: Annotated[Capacities, _record(Capacities)]
+    session: Annotated[int, _or_zero(_unsigned(32))] = 0
+    """The session id: differs from one start to the next and from robot to robot; 0 if there is none."""
+
+    def start(self) -> tuple[int, int, int, int]:
+        """What distinguishes this start of the robot from others."""
+        return self.session, self.boot, self.reset_cause, self.seed
 
     def complaint(self) -> Optional[str]:
         """Why this module does not understand the robot fully; None if it does.
@@ -563,6 +582,40 @@ class Version:
     patch: U8
 
 
+class Setting(enum.IntEnum):
+    """The settings that can be changed while a robot runs; `docs/wire.md` has the ranges."""
+
+    NOISE_MM = 0
+    HYPOTHESES = 1
+    MOVES = 2
+    WRONG_TURN_PERMILLE = 3
+    WRONG_DEGREE_PERMILLE = 4
+    EQUIDISTANCE_MM = 5
+    LEAVE_MM = 6
+    SPEED_PERMILLE = 7
+    SNAPSHOT_EVERY_PLACES = 8
+
+
+def _setting() -> _Codec:
+    number = _unsigned(32)
+
+    def read(payload: bytes, at: int) -> tuple[Setting, int]:
+        setting, at = number.read(payload, at)
+        if setting >= len(Setting):
+            raise _UnknownPayload
+        return Setting(setting), at
+
+    return _Codec(read, lambda setting, out: number.write(setting, out))
+
+
+@dataclass(frozen=True)
+class SettingValue:
+    """A setting and its value."""
+
+    setting: Annotated[Setting, _setting()]
+    value: U16
+
+
 class Outcome:
     """The outcome of a request: one of these."""
 
@@ -598,8 +651,14 @@ class Outcome:
 
         refusal: Annotated[Refusal, _kind(Refusal)]
 
+    @dataclass(frozen=True)
+    class Settings:
+        """The settings of the robot."""
 
-AnyOutcome = Union[Outcome.Done, Outcome.Info, Outcome.Snapshot, Outcome.Refused]
+        settings: Annotated[tuple[SettingValue, ...], _list(_record(SettingValue), 16)]
+
+
+AnyOutcome = Union[Outcome.Done, Outcome.Info, Outcome.Snapshot, Outcome.Refused, Outcome.Settings]
 
 
 @dataclass(frozen=True)
@@ -607,7 +666,7 @@ class Reply:
     """The reply to a request."""
 
     request: U16
-    outcome: Annotated[AnyOutcome, _choice(Outcome.Done, Outcome.Info, Outcome.Snapshot, Outcome.Refused)]
+    outcome: Annotated[AnyOutcome, _choice(*typing.get_args(AnyOutcome))]
 
 
 @dataclass(frozen=True)
@@ -730,32 +789,6 @@ _MESSAGE = _choice(*typing.get_args(Message))
 # Requests to a robot.
 
 
-class Setting(enum.IntEnum):
-    """The settings that can be changed while a robot runs; `docs/wire.md` has the ranges."""
-
-    NOISE_MM = 0
-    HYPOTHESES = 1
-    MOVES = 2
-    WRONG_TURN_PERMILLE = 3
-    WRONG_DEGREE_PERMILLE = 4
-    EQUIDISTANCE_MM = 5
-    LEAVE_MM = 6
-    SPEED_PERMILLE = 7
-    SNAPSHOT_EVERY_PLACES = 8
-
-
-def _setting() -> _Codec:
-    number = _unsigned(32)
-
-    def read(payload: bytes, at: int) -> tuple[Setting, int]:
-        setting, at = number.read(payload, at)
-        if setting >= len(Setting):
-            raise _UnknownPayload
-        return Setting(setting), at
-
-    return _Codec(read, lambda setting, out: number.write(setting, out))
-
-
 class Command:
     """A command to a robot: one of these."""
 
@@ -824,6 +857,10 @@ class Command:
 
         on: Flag
 
+    @dataclass(frozen=True)
+    class GetSettings:
+        """Requests the settings of the robot; the outcome is `Outcome.Settings`."""
+
 
 AnyCommand = Union[
     Command.Info,
@@ -838,6 +875,7 @@ AnyCommand = Union[
     Command.GoTo,
     Command.Explore,
     Command.Pause,
+    Command.GetSettings,
 ]
 
 
@@ -920,6 +958,8 @@ class Counters:
     too_long: int = 0
     unknown_version: int = 0
     unknown_message: int = 0
+    restarts: int = 0
+    """Restarts of the sender."""
 
 
 _COUNTER_OF = {
@@ -929,6 +969,15 @@ _COUNTER_OF = {
     DecodeError.UNKNOWN_VERSION: "unknown_version",
     DecodeError.UNKNOWN_MESSAGE: "unknown_message",
 }
+
+
+def _clock(message: Union[Message, Request]) -> Optional[tuple[str, int]]:
+    """A number that ascends from the start of the robot on, with the name of its clock."""
+    if isinstance(message, (Ring, Velocity)):
+        return "frames", message.frame_index
+    if isinstance(message, Health):
+        return "uptime_ms", message.uptime_ms
+    return None
 
 
 class Decoder:
@@ -943,7 +992,15 @@ class Decoder:
         self._version, self._codec = (_TO_ROBOT, _REQUEST) if requests else (FRAME_VERSION, _MESSAGE)
         self._begun = b""
         self._last_sequence: Optional[int] = None
-        self._last_boot: Optional[int] = None
+        self._reopened = False
+        self._start: Optional[tuple[int, int, int, int]] = None
+        self._clocks: dict[str, int] = {}
+
+    def reconnected(self) -> None:
+        """Prepares for a reopened line: drops an incomplete frame. No frame is late on a new line, so a number that does not
+        follow the last one shows a restart."""
+        self._begun = b""
+        self._reopened = True
 
     def feed(self, data: bytes) -> list[Event]:
         """Decodes bytes; returns the events that they complete, in order."""
@@ -980,7 +1037,8 @@ class Decoder:
             message, end = self._codec.read(body, _HEADER_BYTES)
         except (_UnknownPayload, IndexError):
             end = None
-        if end != len(body):
+        # A Hello may grow: it is read as far as it is known.
+        if end != len(body) and not (end is not None and isinstance(message, Hello)):
             # A newer sender's messages must not look like lost frames; after a gap the next message reports it.
             if self._last_sequence is not None and (self._last_sequence + 1) & 0xFFFF == sequence:
                 self._last_sequence = sequence
@@ -992,28 +1050,42 @@ class Decoder:
         return Damaged(error, version)
 
     def _received(self, sequence: int, message: Union[Message, Request]) -> Received:
-        has_restarted = False
+        has_other_start = False
         if isinstance(message, Hello):
-            has_restarted = self._last_boot is not None and self._last_boot != message.boot
-            self._last_boot = message.boot
+            has_other_start = self._start is not None and self._start != message.start()
+            self._start = message.start()
+        is_reopened, self._reopened = self._reopened, False
         lost = 0
         ahead = None if self._last_sequence is None else (sequence - self._last_sequence) & 0xFFFF
         if ahead is None:
             arrival = Arrival.FIRST
-        elif has_restarted:
+        elif has_other_start:
             arrival = Arrival.RESTART
         elif ahead == 1:
             arrival = Arrival.IN_ORDER
         elif 2 <= ahead <= 0x7FFF:
             arrival = Arrival.AFTER_GAP
-            lost = ahead - 1
-            self._count("lost", lost)
-        elif -ahead & 0xFFFF < _LATE_WINDOW:
+        elif -ahead & 0xFFFF < _LATE_WINDOW and not is_reopened:
             arrival = Arrival.LATE
         else:
             arrival = Arrival.RESTART
         if arrival is not Arrival.LATE:
             self._last_sequence = sequence
+            clock = _clock(message)
+            if clock is not None:
+                name, now = clock
+                if now - self._clocks.get(name, now) & 0xFFFF_FFFF > 0x7FFF_FFFF:
+                    arrival = Arrival.RESTART
+            if arrival is Arrival.AFTER_GAP and ahead is not None:
+                lost = ahead - 1
+                self._count("lost", lost)
+            elif arrival is Arrival.RESTART:
+                self._count("restarts")
+                self._clocks = {}
+                # The next Hello is that of the new start.
+                self._start = message.start() if isinstance(message, Hello) else None
+            if clock is not None:
+                self._clocks[clock[0]] = clock[1]
         self._count("messages")
         return Received(sequence, arrival, lost, message)
 
@@ -1222,10 +1294,11 @@ def _bits(row: int) -> Iterator[int]:
 
 
 def to_json(event: Event) -> dict[str, Any]:
-    """An event as plain data, as the `toposlam` command prints it: `event` is the name of the message, or `Damaged`, with
-    the fields of the message beside it. `lost` is present if frames are missing before it."""
+    """An event as plain data, as the `toposlam` command prints it: `event` is the name of the message, `Damaged`, or
+    `Unknown` for an intact frame of another version, with the fields of the message beside it. `lost` is present if frames are missing before it."""
     if isinstance(event, Damaged):
-        return {"event": "Damaged", "error": str(event)}
+        is_unknown = event.error in (DecodeError.UNKNOWN_VERSION, DecodeError.UNKNOWN_MESSAGE)
+        return {"event": "Unknown" if is_unknown else "Damaged", "error": str(event)}
     plain: dict[str, Any] = {**_plain(event.message), "event": type(event.message).__name__, "sequence": event.sequence}
     if event.arrival is Arrival.AFTER_GAP:
         plain["lost"] = event.lost
@@ -1240,8 +1313,10 @@ def json_line(plain: Any) -> str:
 def _plain(value: Any) -> Any:
     if isinstance(value, Outcome.Refused):
         return {"Refused": value.refusal.value}
+    if isinstance(value, SettingValue):
+        return {value.setting.name.title().replace("_", ""): value.value}
     if isinstance(value, Command.SetConfig):
-        return {"SetConfig": {value.setting.name.title().replace("_", ""): value.value}}
+        return {"SetConfig": _plain(SettingValue(value.setting, value.value))}
     if dataclasses.is_dataclass(value):
         plain = {field.name: _plain(getattr(value, field.name)) for field in dataclasses.fields(value)}
         if type(value).__qualname__ == type(value).__name__:

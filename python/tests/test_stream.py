@@ -167,7 +167,7 @@ class Golden(unittest.TestCase):
         for version in (toposlam_stream.PROTOCOL_VERSION, toposlam_stream.FRAME_VERSION):
             self.assertIn(f"version is {version}", specification)
         self.assertIn(f"{toposlam_stream.SCHEMA_HASH:016X}", specification)
-        for kind, requests, count in (("example", False, 24), ("request", True, 20)):
+        for kind, requests, count in (("example", False, 25), ("request", True, 21)):
             blocks = re.findall(rf"```{kind}\n(.*?)```", specification, re.DOTALL)
             self.assertEqual(len(blocks), count)
             for block in blocks:
@@ -175,6 +175,40 @@ class Golden(unittest.TestCase):
                 (event,) = Decoder(requests).feed(frame)
                 self.assertIn(f"sequence: {event.sequence}\n", block)
                 self.assertEqual(Encoder(event.sequence).encode(event.message), frame)
+
+
+class Restarts(unittest.TestCase):
+    """A number that is higher by chance looks like lost frames; the session id and the clocks show the restart."""
+
+    HELLO = next(event.message for event in Decoder().feed(exploration()) if isinstance(event.message, Hello))
+
+    def replica(self, *frames: bytes, reopens: bool = False) -> MapReplica:
+        decoder, replica = Decoder(), MapReplica()
+        encoder = Encoder()
+        before = [self.HELLO, Edge(0, 1, True), GoalStatus(1, GoalState.ACTIVE), Ring(900, ())]
+        for event in decoder.feed(b"".join(map(encoder.encode, before))):
+            replica.apply(event)
+        self.assertEqual((replica.edges(), replica.vertices), ([(0, 1)], 2))
+        if reopens:
+            decoder.reconnected()
+        for event in decoder.feed(b"".join(frames)):
+            replica.apply(event)
+        self.assertEqual(decoder.counters.restarts, 1)
+        return replica
+
+    def test_no_state_of_the_session_before_is_left(self) -> None:
+        hello = dataclasses.replace(self.HELLO, session=self.HELLO.session ^ 1)
+        late = Encoder(2).encode(Edge(4, 5, True))
+        restarts = {
+            "session": [Encoder(500).encode(hello)],
+            "clock": [Encoder(500).encode(Ring(30, ())), Encoder(501).encode(hello)],
+            "late": [late, Encoder(3).encode(hello)],
+        }
+        for name, frames in restarts.items():
+            with self.subTest(name):
+                replica = self.replica(*frames, reopens=name == "late")
+                self.assertEqual((replica.hello, replica.goal_status), (hello, None))
+                self.assertFalse((0, 1) in replica.edges())
 
 
 class WaysOfAMap(unittest.TestCase):

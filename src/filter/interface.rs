@@ -39,6 +39,9 @@ pub trait Filter<const V: usize>: Sized {
     /// [`ConfigError`] names the first field that is out of its range; the filter does not change then.
     fn start(&mut self, config: Self::Config, seed: u64) -> Result<(), ConfigError>;
 
+    /// The configuration in use. A restored snapshot brings its own.
+    fn config(&self) -> &Self::Config;
+
     /// Replaces the configuration. The filter keeps what it observed.
     ///
     /// # Errors

@@ -65,6 +65,7 @@ mod tests {
             snapshot: SnapshotPolicy::DEFAULT,
             turn_bound_ms: 1000,
             boot: 0,
+            session: 0,
             reset_cause: ResetCause::Unknown,
         };
         assert_eq!(ROBOT, expected);

@@ -61,6 +61,7 @@ where
             Command::GoTo { vertex } => self.go_to(vertex, board)?,
             Command::Explore => self.set_goal(Goal::Explore, board),
             Command::Pause { on } => self.paused = on,
+            Command::GetSettings => return Ok(Outcome::Settings { settings: self.settings().list() }),
         }
         Ok(Outcome::Done)
     }
@@ -101,6 +102,8 @@ where
         let Self { mapper, reporter, drive, config, encoder, faults, .. } = self;
         let mut line = Line { encoder, faults, board };
         reporter.forget(|message| line.send(message));
+        // A restored snapshot may have brought other settings.
+        config.mapper.filter = *mapper.filter().config();
         mapper.start(&config.mapper).map_err(|_| Refusal::OutOfRange)?;
         reporter.start(config.hello::<V, F>(), FRAMES_PER_HELLO);
         drive.start(config.drive, config.mapper.seed).map_err(|_| Refusal::OutOfRange)?;
@@ -110,13 +113,18 @@ where
         Ok(())
     }
 
-    fn set(&mut self, setting: Setting) -> Result<(), Refusal> {
-        let settings = Settings {
-            filter: self.config.mapper.filter,
+    /// The settings in use.
+    fn settings(&self) -> Settings<F::Config> {
+        Settings {
+            filter: *self.mapper.filter().config(),
             place: self.config.mapper.place,
             speed_permille: self.config.drive.speed_permille,
             snapshot_every_places: self.config.snapshot.every_places,
-        };
+        }
+    }
+
+    fn set(&mut self, setting: Setting) -> Result<(), Refusal> {
+        let settings = self.settings();
         // The filter itself refuses more hypotheses than it has room for.
         let settings = settings.with(setting, usize::from(u8::MAX), SONARS)?;
         self.mapper.set_config(settings.place, settings.filter).map_err(|_| Refusal::OutOfRange)?;

@@ -20,8 +20,11 @@ pub struct RobotConfig<const SONARS: usize, C> {
     pub snapshot: SnapshotPolicy,
     /// The longest regular turn of the main loop in milliseconds; a longer one is counted as a fault. Default 1000.
     pub turn_bound_ms: u16,
-    /// A number that differs from one start of the robot to the next; 0 if there is none.
+    /// The number of the start; 0 if the robot does not count them.
     pub boot: u32,
+    /// The session id: a random number, different at each start. The default 0 derives one from the first ring frame, whose
+    /// noise differs, and from `boot`, `reset_cause`, the seed and the time.
+    pub session: u32,
     /// Why the robot started.
     pub reset_cause: ResetCause,
 }
@@ -33,6 +36,7 @@ impl<const SONARS: usize, C: Copy> RobotConfig<SONARS, C> {
         with_snapshot, snapshot: SnapshotPolicy;
         with_turn_bound_ms, turn_bound_ms: u16;
         with_boot, boot: u32;
+        with_session, session: u32;
         with_reset_cause, reset_cause: ResetCause;
     }
 
@@ -50,6 +54,7 @@ impl<const SONARS: usize, C: Copy> RobotConfig<SONARS, C> {
             snapshot: SnapshotPolicy::DEFAULT,
             turn_bound_ms: 1000,
             boot: 0,
+            session: 0,
             reset_cause: ResetCause::Unknown,
         }
     }
@@ -80,12 +85,13 @@ impl<const SONARS: usize, C: FilterSettings> RobotConfig<SONARS, C> {
         snapshot: SnapshotPolicy { every_places: 0 },
         turn_bound_ms: 0,
         boot: 0,
+        session: 0,
         reset_cause: ResetCause::Unknown,
     };
 
     /// The introduction of a robot with these settings and a filter `F`.
     pub(super) fn hello<const V: usize, F: Filter<V, Config = C>>(&self) -> Hello {
         let capacities = Capacities::of_mapper::<SONARS, V, F>(&self.mapper);
-        Hello::new(self.boot, self.reset_cause, self.mapper.seed, capacities)
+        Hello { session: self.session, ..Hello::new(self.boot, self.reset_cause, self.mapper.seed, capacities) }
     }
 }

@@ -56,6 +56,7 @@ mod config;
 pub use board::{Board, SaveError};
 pub use config::RobotConfig;
 
+use crate::checksum::CRC;
 use crate::config_error::ConfigError;
 use crate::drive::{Drive, Goal, GoalStatus, VelocityCommand};
 use crate::fault::{FaultCounters, FaultKind};
@@ -170,6 +171,9 @@ where
     /// due, and feeds the watchdog. `ring_faults` are the faults of the ring's driver since the start.
     pub fn turn(&mut self, frame: &RingFrame<SONARS>, ring_faults: &FaultCounters, board: &mut impl Board) -> Seen {
         self.check_duration(board);
+        if self.config.session == 0 {
+            self.draw_session(frame, board);
+        }
         self.poll_commands(board);
         let faults = self.loop_faults(ring_faults);
         let (seen, velocity) =
@@ -198,6 +202,21 @@ where
         self.turns = self.turns.wrapping_add(1);
         board.feed_watchdog();
         seen
+    }
+
+    /// Derives the session id from what differs between starts and robots: the noise of the first ring frame above all.
+    #[inline(never)]
+    fn draw_session(&mut self, frame: &RingFrame<SONARS>, board: &mut impl Board) {
+        let mut digest = CRC.digest();
+        digest.update(&self.config.boot.to_le_bytes());
+        digest.update(&[self.config.reset_cause as u8]);
+        digest.update(&self.config.mapper.seed.to_le_bytes());
+        digest.update(&board.now_ms().to_le_bytes());
+        for code in Echoes::new(&frame.echoes).codes() {
+            digest.update(&code.to_le_bytes());
+        }
+        self.config.session = digest.finalize().max(1);
+        self.reporter.set_session(self.config.session);
     }
 
     #[inline(never)]

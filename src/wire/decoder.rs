@@ -4,7 +4,7 @@ use core::fmt;
 use core::marker::PhantomData;
 
 use super::frame::{CRC_BYTES, HEADER_BYTES, MAX_RAW_BYTES};
-use super::{Message, Payload};
+use super::{Clock, Message, Payload, Start};
 use crate::checksum::CRC;
 
 /// The result of feeding bytes to a decoder.
@@ -53,7 +53,7 @@ pub enum Arrival {
     },
     /// One of the last 64 numbers: the frame was repeated or overtaken.
     Late,
-    /// The sender has restarted.
+    /// The sender has restarted, or it is another one: nothing from before is valid.
     Restart,
 }
 
@@ -74,13 +74,15 @@ pub struct DecoderCounters {
     pub unknown_version: u32,
     /// Intact frames with an unknown message.
     pub unknown_message: u32,
+    /// Restarts of the sender.
+    pub restarts: u32,
 }
 
 /// Decodes the bytes of a serial line, in pieces of any length, into messages; on the robot, into
 /// [`Request`](super::Request)s.
 ///
 /// It never blocks and never reads beyond a complete frame. The next zero byte ends every frame, valid or not, so that
-/// damage never spreads beyond a frame and its neighbour. Memory: 160 bytes.
+/// damage never spreads beyond a frame and its neighbour. Memory: 200 bytes.
 ///
 /// ```
 /// use toposlam::wire::{Decoder, Encoder, MAX_FRAME_BYTES, Message, Progress};
@@ -113,7 +115,12 @@ pub struct Decoder<M = Message> {
     begun: bool,
     too_long: bool,
     last_sequence: Option<u16>,
-    last_boot: Option<u32>,
+    /// Whether the line was reopened after the last message.
+    reopened: bool,
+    /// Whether the start of the sender is known, and which. A `None` is not all zero and would move a `static` decoder out of `.bss`.
+    knows_start: bool,
+    start: Start,
+    clocks: Clocks,
     counters: DecoderCounters,
     hands_out: PhantomData<fn() -> M>,
 }
@@ -131,7 +138,10 @@ impl<M: Payload> Decoder<M> {
             begun: false,
             too_long: false,
             last_sequence: None,
-            last_boot: None,
+            reopened: false,
+            knows_start: false,
+            start: Start::NONE,
+            clocks: Clocks::NONE,
             counters: DecoderCounters {
                 messages: 0,
                 lost: 0,
@@ -140,6 +150,7 @@ impl<M: Payload> Decoder<M> {
                 too_long: 0,
                 unknown_version: 0,
                 unknown_message: 0,
+                restarts: 0,
             },
             hands_out: PhantomData,
         }
@@ -148,6 +159,14 @@ impl<M: Payload> Decoder<M> {
     /// The counts so far.
     pub const fn counters(&self) -> DecoderCounters {
         self.counters
+    }
+
+    /// Prepares for a reopened line: drops an incomplete frame. No frame is late on a new line, so a number that does not
+    /// follow the last one shows a restart.
+    pub fn reconnected(&mut self) {
+        self.drop_frame();
+        self.begun = false;
+        self.reopened = true;
     }
 
     /// Consumes bytes up to the end of the next frame. Call it with the rest until it returns [`Progress::NeedsMore`].
@@ -163,9 +182,7 @@ impl<M: Payload> Decoder<M> {
                 continue;
             }
             let frame = self.finish();
-            self.length = 0;
-            self.block_left = 0;
-            self.too_long = false;
+            self.drop_frame();
             return match frame {
                 Ok((sequence, None)) => {
                     self.pass_over(sequence);
@@ -184,6 +201,12 @@ impl<M: Payload> Decoder<M> {
             };
         }
         Progress::NeedsMore
+    }
+
+    fn drop_frame(&mut self) {
+        self.length = 0;
+        self.block_left = 0;
+        self.too_long = false;
     }
 
     /// Decodes one non-zero byte.
@@ -233,7 +256,7 @@ impl<M: Payload> Decoder<M> {
         }
         let sequence = u16::from_le_bytes([*low, *high]);
         match postcard::take_from_bytes::<M>(payload) {
-            Ok((message, [])) => Ok((sequence, Some(message))),
+            Ok((message, rest)) if rest.is_empty() || message.start().is_some() => Ok((sequence, Some(message))),
             _ => Ok((sequence, None)),
         }
     }
@@ -247,24 +270,41 @@ impl<M: Payload> Decoder<M> {
     }
 
     fn arrival(&mut self, sequence: u16, message: &M) -> Arrival {
-        let mut restart = false;
-        if let Some(boot) = message.boot() {
-            restart = self.last_boot.is_some_and(|last| last != boot);
-            self.last_boot = Some(boot);
-        }
-        let arrival = match self.last_sequence.map(|last| sequence.wrapping_sub(last)) {
+        let has_other_start = match message.start() {
+            Some(start) => {
+                let last = core::mem::replace(&mut self.start, start);
+                core::mem::replace(&mut self.knows_start, true) && last != start
+            }
+            None => false,
+        };
+        let is_reopened = core::mem::take(&mut self.reopened);
+        let mut arrival = match self.last_sequence.map(|last| sequence.wrapping_sub(last)) {
             None => Arrival::First,
-            Some(_) if restart => Arrival::Restart,
+            Some(_) if has_other_start => Arrival::Restart,
             Some(1) => Arrival::InOrder,
             Some(ahead @ 2..=0x7FFF) => Arrival::AfterGap { lost: ahead - 1 },
-            Some(ahead) if ahead.wrapping_neg() < Self::LATE_WINDOW => Arrival::Late,
+            Some(ahead) if ahead.wrapping_neg() < Self::LATE_WINDOW && !is_reopened => return Arrival::Late,
             Some(_) => Arrival::Restart,
         };
-        if let Arrival::AfterGap { lost } = arrival {
-            bump(&mut self.counters.lost, u32::from(lost));
+        self.last_sequence = Some(sequence);
+        if let Some(clock) = message.clock()
+            && self.clocks.run_backwards(clock)
+        {
+            arrival = Arrival::Restart;
         }
-        if arrival != Arrival::Late {
-            self.last_sequence = Some(sequence);
+        match arrival {
+            Arrival::AfterGap { lost } => bump(&mut self.counters.lost, lost.into()),
+            Arrival::Restart => {
+                bump(&mut self.counters.restarts, 1);
+                self.clocks = Clocks::NONE;
+                // The next Hello is that of the new start.
+                self.knows_start = message.start().is_some();
+                self.start = message.start().unwrap_or(Start::NONE);
+            }
+            Arrival::First | Arrival::InOrder | Arrival::Late => {}
+        }
+        if let Some(clock) = message.clock() {
+            self.clocks.set(clock);
         }
         arrival
     }
@@ -287,6 +327,32 @@ impl<M: Payload> Decoder<M> {
 impl<M: Payload> Default for Decoder<M> {
     fn default() -> Self {
         Self::new()
+    }
+}
+
+/// The last clocks of the sender. They ascend until it restarts.
+#[derive(Clone, Copy, Debug)]
+struct Clocks {
+    frames: Option<u32>,
+    uptime_ms: Option<u32>,
+}
+
+impl Clocks {
+    const NONE: Self = Self { frames: None, uptime_ms: None };
+
+    fn run_backwards(&self, clock: Clock) -> bool {
+        let (last, now) = match clock {
+            Clock::Frames(now) => (self.frames, now),
+            Clock::UptimeMs(now) => (self.uptime_ms, now),
+        };
+        last.is_some_and(|last| now.wrapping_sub(last) > u32::MAX / 2)
+    }
+
+    fn set(&mut self, clock: Clock) {
+        match clock {
+            Clock::Frames(now) => self.frames = Some(now),
+            Clock::UptimeMs(now) => self.uptime_ms = Some(now),
+        }
     }
 }
 

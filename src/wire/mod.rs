@@ -38,9 +38,9 @@ pub use digest::{crc32, map_digest};
 pub use frame::{EncodeError, Encoder, FRAME_VERSION, MAX_FRAME_BYTES};
 pub use listener::MapReplica;
 pub use messages::{
-    Belief, CHUNK_BYTES, Capacities, Chunk, Command, Echoes, Evidence, Exploration, Factors, FilterSettings, GoalState,
-    GoalStatus, Health, Hello, HelloError, Info, List, Location, Message, Outcome, PROTOCOL_VERSION, Payload, Refusal,
-    Remapped, Reply, Request, ResetCause, Row, SCHEMA_HASH, Setting, Settings, Velocity, Version, VertexProbability,
-    VertexWays, Way, WayId, Worst,
+    Belief, CHUNK_BYTES, Capacities, Chunk, Clock, Command, Echoes, Evidence, Exploration, Factors, FilterSettings,
+    GoalState, GoalStatus, Health, Hello, HelloError, Info, List, Location, Message, Outcome, PROTOCOL_VERSION,
+    Payload, Refusal, Remapped, Reply, Request, ResetCause, Row, SCHEMA_HASH, SETTINGS_MAX, Setting, Settings, Start,
+    Velocity, Version, VertexProbability, VertexWays, Way, WayId, Worst,
 };
 pub use robot::{Inbox, QueueFull, Reporter, Staging};

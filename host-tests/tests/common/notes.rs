@@ -34,6 +34,10 @@ impl Filter<VERTICES> for Notes {
         Err(ConfigError::OutOfRange { field: "history", value: 0, min: 1, max: u16::MAX.into() })
     }
 
+    fn config(&self) -> &u16 {
+        &self.history
+    }
+
     fn set_config(&mut self, _: u16) -> Result<(), ConfigError> {
         Ok(())
     }

@@ -17,7 +17,8 @@ use toposlam_sim::world::{Plan, RobotModel};
 
 use super::samples::{extreme_requests, extremes, largest, largest_requests, requests, typical};
 use super::streams::{
-    Draw, damage, every_damage, foreign_payloads, impossible_ways, long_lists, lossy, renamed, restarted, wrapping,
+    Draw, damage, every_damage, foreign_payloads, impossible_ways, long_lists, lossy, renamed, restarted,
+    restarted_unheard, two_robots, version_5, wrapping,
 };
 use super::{decode, frame};
 
@@ -61,6 +62,9 @@ fn records(exploration: &[Vec<u8>]) -> Vec<Value> {
         "a robot that restarts without a word",
         &exploration[..40].iter().chain(&exploration[..9]).flatten().copied().collect::<Vec<u8>>(),
     ));
+    records.push(stream("a robot that restarts unheard, with a higher number", &restarted_unheard(exploration)));
+    records.push(stream("two robots on one line", &two_robots(exploration)));
+    records.push(stream("a Hello of version 5, and one of a later version", &version_5()));
     records.push(stream("one of every kind of damage", &every_damage()));
     records.push(stream("numbers that wrap", &wrapping()));
     records.push(stream("lists that are too long", &long_lists()));
@@ -87,7 +91,7 @@ fn records(exploration: &[Vec<u8>]) -> Vec<Value> {
 /// Asserts that the streams cover every counter and a converged replica.
 fn assert_streams_cover_everything(records: &[Value]) {
     let streams: Vec<&Value> = records.iter().filter(|record| record["kind"] == "stream").collect();
-    for counter in ["lost", "corrupt", "cut", "too_long", "unknown_version", "unknown_message"] {
+    for counter in ["lost", "corrupt", "cut", "too_long", "unknown_version", "unknown_message", "restarts"] {
         assert!(streams.iter().filter(|stream| stream["counters"][counter] != 0).count() > 1, "no {counter}");
     }
     assert_eq!(streams[0]["replica"]["is_converged"], true, "{}", streams[0]["replica"]);
@@ -118,7 +122,7 @@ fn stream(name: &str, bytes: &[u8]) -> Value {
         converged += u32::from(listener.replica().is_converged());
         lines += &format!("{}\n", json::event(event));
     });
-    let DecoderCounters { messages, lost, corrupt, cut, too_long, unknown_version, unknown_message } =
+    let DecoderCounters { messages, lost, corrupt, cut, too_long, unknown_version, unknown_message, restarts } =
         listener.counters();
     json!({
         "kind": "stream",
@@ -129,7 +133,7 @@ fn stream(name: &str, bytes: &[u8]) -> Value {
         "converged": converged,
         "counters": {
             "messages": messages, "lost": lost, "corrupt": corrupt, "cut": cut, "too_long": too_long,
-            "unknown_version": unknown_version, "unknown_message": unknown_message,
+            "unknown_version": unknown_version, "unknown_message": unknown_message, "restarts": restarts,
         },
         "replica": replica_json(listener.replica()),
     })

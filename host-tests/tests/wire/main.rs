@@ -18,7 +18,10 @@ mod streams;
 
 use samples::{largest, typical};
 use toposlam::VertexId;
-use toposlam::wire::{Arrival, Decoder, Encoder, Header, MAX_FRAME_BYTES, Message, Payload, Progress};
+use toposlam::wire::{
+    Arrival, Decoder, Echoes, Encoder, Header, Health, Hello, MAX_FRAME_BYTES, Message, Payload, Progress, ResetCause,
+    Velocity,
+};
 
 /// The vertex with an id.
 fn vertex(number: usize) -> VertexId {
@@ -116,11 +119,91 @@ fn lost_repeated_and_restarted_frames_are_distinguished() {
     assert_eq!(arrival(2, edge), Arrival::AfterGap { lost: 4 });
     assert_eq!(arrival(65535, edge), Arrival::Late);
     assert_eq!(arrival(3, Message::Hello(hello)), Arrival::InOrder);
-    hello.boot += 1;
+    hello.session += 1;
     assert_eq!(arrival(0, Message::Hello(hello)), Arrival::Restart);
     assert_eq!(arrival(1, edge), Arrival::InOrder);
     assert_eq!(arrival(40_000, edge), Arrival::Restart);
     assert_eq!(decoder.counters().lost, 6);
+}
+
+/// Every way in which two starts may differ; the sequence numbers look like lost frames.
+#[test]
+fn a_start_that_differs_in_anything_is_a_restart() {
+    let Message::Hello(hello) = typical()[0] else { panic!("the first sample is a Hello") };
+    let others = [
+        Hello { session: hello.session + 1, ..hello },
+        Hello { session: 0, boot: hello.boot + 1, ..hello },
+        Hello { session: 0, seed: hello.seed + 1, ..hello },
+        Hello { session: 0, reset_cause: ResetCause::Watchdog, ..hello },
+    ];
+    for other in others {
+        let last = Hello { session: if other.session == 0 { 0 } else { hello.session }, ..hello };
+        let arrivals =
+            arrivals([(100, Message::Hello(last)), (900, Message::Hello(other)), (901, Message::Hello(other))]);
+        assert_eq!(arrivals, [Arrival::First, Arrival::Restart, Arrival::InOrder], "{other:?}");
+    }
+}
+
+#[test]
+fn a_clock_that_runs_backwards_is_a_restart_and_the_hello_after_it_is_not() {
+    let Message::Hello(hello) = typical()[0] else { panic!("the first sample is a Hello") };
+    let again = Message::Hello(Hello { session: hello.session + 1, ..hello });
+    let ring = |frame_index| Message::Ring { frame_index, echoes: Echoes::EMPTY };
+    let velocity =
+        |frame_index| Message::Velocity(Velocity { frame_index, heading_mrad: 0, speed_permille: 0, state: 0 });
+    let health = |uptime_ms| Message::Health(Health { uptime_ms, ..Health::default() });
+    for (before, after) in [(ring(70), ring(69)), (velocity(70), ring(0)), (health(9000), health(0))] {
+        let stream = [(0, Message::Hello(hello)), (1, before), (500, after), (501, again), (502, after)];
+        let expected = [Arrival::First, Arrival::InOrder, Arrival::Restart, Arrival::InOrder, Arrival::InOrder];
+        assert_eq!(arrivals(stream), expected, "{before:?}");
+    }
+    // A clock wraps, stands still in a message that is repeated, and is behind in one that was overtaken.
+    let stream = [(0, ring(u32::MAX)), (1, ring(0)), (2, velocity(0)), (1, ring(u32::MAX)), (3, ring(1))];
+    assert!(!arrivals(stream).contains(&Arrival::Restart));
+}
+
+#[test]
+fn no_frame_of_a_reopened_line_is_late() {
+    let edge = Message::Edge { a: 0, b: 1, present: true };
+    let mut decoder = Decoder::new();
+    let mut arrival = |sequence, reopens| {
+        if reopens {
+            decoder.reconnected();
+        }
+        let mut decoded = Decoded::default();
+        decoded.decode(&mut decoder, &frame(&mut Encoder::new(sequence), &edge));
+        decoded.messages[0].0.arrival
+    };
+    assert_eq!(arrival(100, false), Arrival::First);
+    assert_eq!(arrival(90, false), Arrival::Late);
+    assert_eq!(arrival(90, true), Arrival::Restart);
+    assert_eq!(arrival(91, true), Arrival::InOrder);
+    assert_eq!(arrival(99, true), Arrival::AfterGap { lost: 7 });
+    assert_eq!(decoder.counters().restarts, 1);
+}
+
+#[test]
+fn a_hello_of_an_older_or_newer_version_is_read_as_far_as_it_is_known() {
+    let decoded = decode(&streams::version_5());
+    let versions: Vec<_> = decoded
+        .messages
+        .iter()
+        .map(|(header, message)| match message {
+            Message::Hello(hello) => (hello.protocol_version, hello.session, header.arrival),
+            other => panic!("{other:?}"),
+        })
+        .collect();
+    assert_eq!(versions, [(5, 0, Arrival::First), (7, 0x5E55_1017, Arrival::Restart)]);
+    assert_eq!(decoded.errors, 0);
+}
+
+fn arrivals<const N: usize>(stream: [(u16, Message); N]) -> [Arrival; N] {
+    let mut decoder = Decoder::new();
+    stream.map(|(sequence, message)| {
+        let mut decoded = Decoded::default();
+        decoded.decode(&mut decoder, &frame(&mut Encoder::new(sequence), &message));
+        decoded.messages[0].0.arrival
+    })
 }
 
 #[test]

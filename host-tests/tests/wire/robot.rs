@@ -59,6 +59,10 @@ impl<const V: usize> Filter<V> for Believer<V> {
         Ok(())
     }
 
+    fn config(&self) -> &() {
+        &()
+    }
+
     fn set_config(&mut self, _: ()) -> Result<(), ConfigError> {
         Ok(())
     }

@@ -4,8 +4,8 @@ use toposlam::Fingerprint;
 use toposlam::ring::Echo;
 use toposlam::wire::{
     Belief, CHUNK_BYTES, Capacities, Chunk, Command, Echoes, Evidence, Exploration, Factors, GoalState, GoalStatus,
-    Health, Hello, Info, List, Location, Message, Outcome, Refusal, Remapped, Reply, Request, ResetCause, Row, Setting,
-    Velocity, Version, VertexProbability, VertexWays, Way, WayId, Worst,
+    Health, Hello, Info, List, Location, Message, Outcome, Refusal, Remapped, Reply, Request, ResetCause, Row,
+    SETTINGS_MAX, Setting, Velocity, Version, VertexProbability, VertexWays, Way, WayId, Worst,
 };
 
 /// A plausible message of every kind, in the order of their numbers; a reply of every kind.
@@ -22,7 +22,7 @@ pub(crate) fn typical() -> Vec<Message> {
     ring[3] = Echo::Silence;
     ring[7] = Echo::Dead;
     vec![
-        Message::Hello(Hello::new(17, ResetCause::BrownOut, 1, capacities)),
+        Message::Hello(Hello { session: 0x5E55_1017, ..Hello::new(17, ResetCause::BrownOut, 1, capacities) }),
         Message::Place { place_index: 42, frame_index: 5310, radius_mm: 1172, degree: Some(3) },
         Message::Map { vertices: 11, edges: 13, digest: 0x8C3A_51F0 },
         Message::Vertex { vertex: 3, radius_mm: 1172, visits: 12 },
@@ -66,6 +66,9 @@ pub(crate) fn typical() -> Vec<Message> {
         })),
         reply(Outcome::Snapshot { total: 2048, offset: 64, bytes: Chunk::new(0..8) }),
         reply(Outcome::Refused(Refusal::UnknownVertex)),
+        reply(Outcome::Settings {
+            settings: List::new([Setting::NoiseMm(60), Setting::LeaveMm(300), Setting::SpeedPermille(1000)]),
+        }),
         Message::Velocity(Velocity { frame_index: 5310, heading_mrad: -250, speed_permille: 700, state: 2 }),
         Message::GoalStatus(GoalStatus { vertex: 3, state: GoalState::Active }),
         Message::Ways(VertexWays {
@@ -130,6 +133,7 @@ pub(crate) fn requests() -> Vec<Request> {
         Command::GoTo { vertex: 3 },
         Command::Explore,
         Command::Pause { on: true },
+        Command::GetSettings,
     ];
     let commands = commands.into_iter().chain(settings.map(Command::SetConfig)).chain(later);
     (300..).zip(commands).map(|(id, command)| Request { id, command }).collect()
@@ -182,6 +186,7 @@ pub(crate) fn largest() -> Vec<Message> {
             reset_cause: ResetCause::LowPower,
             seed: !0,
             capacities,
+            session: WORD,
         }),
         Message::Place { place_index: WORD, frame_index: WORD, radius_mm: SHORT, degree: Some(BYTE) },
         Message::Map { vertices: BYTE, edges: SHORT, digest: WORD },
@@ -230,6 +235,7 @@ pub(crate) fn largest() -> Vec<Message> {
         })),
         largest_reply(Outcome::Snapshot { total: SHORT, offset: SHORT, bytes: Chunk::new([BYTE; CHUNK_BYTES]) }),
         largest_reply(Outcome::Refused(Refusal::Busy)),
+        largest_reply(Outcome::Settings { settings: List::new([Setting::SnapshotEveryPlaces(SHORT); SETTINGS_MAX]) }),
         Message::Velocity(Velocity {
             frame_index: WORD,
             heading_mrad: i16::MIN,
@@ -298,6 +304,7 @@ pub(crate) fn extremes() -> Vec<Message> {
         Message::Remapped(Remapped { place_index: 0, vertices: List::new([]) }),
         Message::Worst(Worst { place_index: 0, distance_mm: 0, newest_age: 0, vertices: List::new([]) }),
         reply(Outcome::Info(info)),
+        reply(Outcome::Settings { settings: List::new([]) }),
         reply(Outcome::Snapshot { total: 0, offset: 0, bytes: Chunk::new([]) }),
         drive(0, 0),
         drive(1, -1),

@@ -56,7 +56,7 @@ fn the_samples_cover_every_message_in_the_order_of_numbers() {
     assert_eq!(described.len(), expected.len());
     // A message or an outcome with the next number needs a sample.
     assert!(!is_known::<Message>(&[expected.len() as u8]));
-    assert!(is_known::<Message>(&[14, 0, 3]) && !is_known::<Message>(&[14, 0, 4]));
+    assert!(is_known::<Message>(&[14, 0, 4]) && !is_known::<Message>(&[14, 0, 5]));
 }
 
 #[test]
@@ -82,13 +82,14 @@ fn the_samples_cover_every_command_and_setting_in_the_order_of_numbers() {
         "9 GoTo",
         "10 Explore",
         "11 Pause",
+        "12 GetSettings",
     ];
     let described: Vec<_> = requests().iter().map(describe).collect();
     for (line, expected) in described.iter().zip(expected) {
         assert!(line.starts_with(&format!("Request {{ id: u16, command: {expected}")), "{line}");
     }
     assert_eq!(described.len(), expected.len());
-    assert!(is_known::<Request>(&[0, 11]) && !is_known::<Request>(&[0, 12]));
+    assert!(is_known::<Request>(&[0, 12]) && !is_known::<Request>(&[0, 13]));
     assert!(is_known::<Request>(&[0, 7, 8]) && !is_known::<Request>(&[0, 7, 9]));
 }
 

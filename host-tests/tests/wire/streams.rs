@@ -4,8 +4,8 @@ use super::damage::with_crc;
 use super::samples::{extremes, largest, requests, typical};
 use super::{decode, frame};
 use toposlam::wire::{
-    Belief, Encoder, FRAME_VERSION, GoalState, GoalStatus, Hello, List, Location, Message, Remapped, ResetCause,
-    VertexProbability, VertexWays, Way, WayId, Worst, crc32,
+    Belief, Echoes, Encoder, FRAME_VERSION, GoalState, GoalStatus, Hello, List, Location, Message, Remapped,
+    ResetCause, VertexProbability, VertexWays, Way, WayId, Worst, crc32,
 };
 
 /// Frames lost, repeated and overtaken.
@@ -28,8 +28,40 @@ pub(crate) fn lossy(frames: &[Vec<u8>]) -> Vec<u8> {
 /// The same robot twice; the second time after a restart and without its first frames.
 pub(crate) fn restarted(frames: &[Vec<u8>]) -> Vec<u8> {
     let Message::Hello(hello) = decode(&frames[0]).messages[0].1 else { panic!("the first message is a Hello") };
-    let again = Message::Hello(Hello { boot: hello.boot.wrapping_add(1), reset_cause: ResetCause::Watchdog, ..hello });
+    let again = Message::Hello(Hello { session: hello.session ^ 1, reset_cause: ResetCause::Watchdog, ..hello });
     [&frames[..60].concat()[..], &[0], &frame(&mut Encoder::new(0), &again), &frames[1..30].concat()].concat()
+}
+
+/// A robot that restarts while nobody listens: its first frames are missing, and its numbers have passed the last one. The
+/// clock of its ring frames shows the restart.
+pub(crate) fn restarted_unheard(frames: &[Vec<u8>]) -> Vec<u8> {
+    let ring = |sequence, frame_index| {
+        frame(&mut Encoder::new(sequence), &Message::Ring { frame_index, echoes: Echoes::EMPTY })
+    };
+    let count = frames.len() as u16;
+    let again = frames[1..30].iter().zip(count + 101..);
+    let again = again.flat_map(|(bytes, sequence)| frame(&mut Encoder::new(sequence), &decode(bytes).messages[0].1));
+    [&frames.concat()[..], &ring(count, 5000), &ring(count + 100, 400), &again.collect::<Vec<u8>>()].concat()
+}
+
+/// The frames of two robots in turns.
+pub(crate) fn two_robots(frames: &[Vec<u8>]) -> Vec<u8> {
+    let Message::Hello(hello) = decode(&frames[0]).messages[0].1 else { panic!("the first message is a Hello") };
+    let other = Message::Hello(Hello { session: hello.session ^ 1, ..hello });
+    let turn = |number: usize| [&frames[0..20], &[frame(&mut Encoder::new(20 + number as u16), &other)]].concat();
+    (0..4).flat_map(turn).flatten().collect()
+}
+
+/// An old Hello ends before the session id, a later one has more fields.
+pub(crate) fn version_5() -> Vec<u8> {
+    let Message::Hello(hello) = typical()[0] else { panic!("the first sample is a Hello") };
+    let old = Message::Hello(Hello { protocol_version: 5, session: 0, ..hello });
+    let later = Message::Hello(Hello { protocol_version: 7, ..hello });
+    let mut old = unpacked(&frame(&mut Encoder::new(0), &old));
+    assert_eq!(old.pop(), Some(0), "the session id is the last field");
+    let mut later = unpacked(&frame(&mut Encoder::new(1), &later));
+    later.extend([1, 2, 3]);
+    [with_crc(&old), with_crc(&later)].concat()
 }
 
 pub(crate) fn every_damage() -> Vec<u8> {

@@ -4,7 +4,7 @@
 //! other to those nearest to the place farthest from it; the halves overlap. A way out of its half is a frontier to a robot.
 //!
 //! ```sh
-//! cargo run --release --package toposlam-cli --example merge_pairs -- 100 1,100,16,24,2-3,3-6,0.03-0.06,general
+//! cargo run --release --package toposlam-cli --example merge_pairs -- 50 1,100,16,24,2-3,3-6,0.03-0.06,general
 //! ```
 
 use std::collections::{BTreeMap, BTreeSet, VecDeque};

@@ -1,12 +1,18 @@
 //! The `toposlam` command: its subcommands.
 
+// `outln!` and `errln!` do not panic when the output fails.
+#![deny(clippy::print_stdout, clippy::print_stderr)]
+
 mod command;
 
+use std::process::ExitCode;
+
 use clap::{Parser, Subcommand};
+use toposlam_cli::{errln, output};
 
 /// Topological SLAM that fits in a microcontroller.
 #[derive(Parser)]
-#[command(version, about)]
+#[command(name = "toposlam", version, about)]
 struct Arguments {
     #[command(subcommand)]
     task: Task,
@@ -55,8 +61,19 @@ enum Task {
     Command(command::console::Arguments),
 }
 
-fn main() -> anyhow::Result<()> {
-    match Arguments::parse().task {
+fn main() -> ExitCode {
+    match run(Arguments::parse().task) {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) if output::is_closed(&error) => ExitCode::SUCCESS,
+        Err(error) => {
+            errln!("Error: {error:?}");
+            error.downcast_ref::<output::ExitError>().map_or(ExitCode::FAILURE, |error| error.code.into())
+        }
+    }
+}
+
+fn run(task: Task) -> anyhow::Result<()> {
+    match task {
         Task::Simulate(arguments) => command::simulate::run(&arguments),
         Task::Explore(arguments) => command::explore::run(&arguments),
         Task::Emulate(arguments) => command::emulate::run(&arguments),

@@ -1,8 +1,11 @@
 //! Progress bar on the standard error, if that is a terminal.
 
 use std::io::{IsTerminal, Write, stderr};
-use std::sync::Mutex;
+use std::sync::{Mutex, PoisonError};
 use std::time::{Duration, Instant};
+
+use crate::outln;
+use crate::output::OutputError;
 
 /// Minimum interval between two drawings of the bar.
 const REDRAW: Duration = Duration::from_millis(100);
@@ -44,12 +47,15 @@ impl Progress {
     }
 
     /// Prints a line to the standard output, above the bar.
-    pub fn println(&self, line: impl std::fmt::Display) {
-        let Ok(mut state) = self.state.lock() else { return };
+    ///
+    /// # Errors
+    /// If the standard output fails.
+    pub fn println(&self, line: impl std::fmt::Display) -> Result<(), OutputError> {
+        let mut state = self.state.lock().unwrap_or_else(PoisonError::into_inner);
         if state.drawn.take().is_some() {
             let _ = write!(stderr(), "\r\x1b[K");
         }
-        println!("{line}");
+        outln!("{line}")
     }
 
     fn line(&self, done: usize) -> String {

@@ -211,7 +211,7 @@ fn command_sends_commands_and_prints_the_replies() {
     {
         assert!(text.contains(expected), "{text}");
     }
-    assert_eq!(answering.join().unwrap(), [wire::Command::Info]);
+    assert_eq!(answering.join().unwrap(), [wire::Command::Info, wire::Command::GetSettings]);
 
     for (arguments, command) in [
         (&["reset"][..], wire::Command::Reset),
@@ -248,8 +248,11 @@ fn command_saves_and_restores_a_snapshot() {
     assert_eq!(std::fs::read(file).unwrap(), snapshot);
 
     let (line, answering) = robot(|_| Outcome::Done);
-    assert_eq!(printed(&toposlam(&["command", &line, "restore", file])), "100 bytes restored\n");
+    let output = toposlam(&["command", &line, "restore", file]);
+    assert_eq!(printed(&output), "100 bytes restored\n");
+    assert!(String::from_utf8_lossy(&output.stderr).contains("does not report its settings"));
     let expected = [
+        wire::Command::Info,
         wire::Command::RestoreBegin { length: 100, crc: crc32(&snapshot) },
         wire::Command::RestoreChunk { offset: 0, bytes: Chunk::new(0..64) },
         wire::Command::RestoreChunk { offset: 64, bytes: Chunk::new(64..100) },
@@ -305,6 +308,8 @@ fn a_command_omitted_from_the_build_names_its_feature() {
             let text = complaint(&toposlam(&[command, "tcp:127.0.0.1:7070", "--seconds", "3"]));
             let expected = format!("--features {feature} -- {command} tcp:127.0.0.1:7070 --seconds 3");
             assert!(text.contains(&expected), "{text}");
+            let text = complaint(&toposlam(&[command, "--help"]));
+            assert!(text.contains(&format!("--features {feature} -- {command} --help")), "{text}");
         }
     }
 }

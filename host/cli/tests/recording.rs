@@ -124,3 +124,45 @@ fn ctrl_c_finishes_a_recording_and_a_kill_leaves_it_readable() {
         assert!(!frames.is_empty());
     }
 }
+
+#[test]
+fn a_played_recording_answers_what_it_can_keeps_its_map_and_refuses_the_rest_in_words() {
+    let directory = tempfile::tempdir().unwrap();
+    let file = directory.path().join("flat.mcap");
+    let file = file.to_str().unwrap();
+    let (_robot, line) = robot();
+    printed(&["record", &line, file, "--places", "4"]);
+    let mut play = toposlam(&["play", file, "--listen", "127.0.0.1:0", "--speed", "1000", "--wait"])
+        .stderr(Stdio::piped())
+        .spawn()
+        .unwrap();
+    let line = address(play.stderr.take().unwrap());
+    let _play = Process(play);
+    assert!(printed(&["command", &line, "info"]).contains("toposlam "));
+    // Played to its end, the recording keeps the last map.
+    let recorded = printed(&["export", file, "--format", "graphml"]);
+    let deadline = std::time::Instant::now() + std::time::Duration::from_secs(60);
+    while printed(&["export", &line, "--format", "graphml"]) != recorded {
+        assert!(std::time::Instant::now() < deadline, "{recorded}");
+    }
+    for arguments in [&["explore"][..], &["go-to", "1"], &["reset"], &["set", "noise-mm", "40"], &["get"]] {
+        let output = toposlam(&[&["command", &line], arguments].concat()).output().unwrap();
+        let text = String::from_utf8_lossy(&output.stderr);
+        assert!(!output.status.success() && text.contains("it is a recording, not a robot"), "{arguments:?}: {text}");
+    }
+    printed(&["command", &line, "pause", "on"]);
+    assert!(printed(&["command", &line, "info"]).contains("paused"));
+}
+
+#[test]
+fn an_empty_recording_is_an_error() {
+    let directory = tempfile::tempdir().unwrap();
+    let [empty, without] = ["empty.mcap", "without.mcap"].map(|name| directory.path().join(name));
+    std::fs::write(&empty, b"").unwrap();
+    toposlam_link::recording::Recorder::create(&without).unwrap().finish().unwrap();
+    for file in [empty, without] {
+        let output = toposlam(&["play", file.to_str().unwrap()]).output().unwrap();
+        let text = String::from_utf8_lossy(&output.stderr);
+        assert!(!output.status.success() && text.contains(file.to_str().unwrap()), "{text}");
+    }
+}

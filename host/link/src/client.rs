@@ -7,10 +7,12 @@ use std::{
 };
 
 use toposlam::wire::{
-    CHUNK_BYTES, Chunk, Command, Encoder, Info, MAX_FRAME_BYTES, MapReplica, Message, Outcome, Refusal, Request, crc32,
+    CHUNK_BYTES, Chunk, Command, Encoder, Info, MAX_FRAME_BYTES, MapReplica, Message, Outcome, Refusal, Request,
+    Setting, crc32,
 };
 
 use crate::listener::{Event, Listener};
+use crate::setting;
 
 const BUFFER_BYTES: usize = 4096;
 
@@ -117,6 +119,46 @@ impl<L: Read + Write, F: FnMut(&Listener, Event<'_>)> Client<L, F> {
         }
     }
 
+    /// Requests the settings of the robot.
+    ///
+    /// # Errors
+    /// As [`Client::order`]; [`ClientError::NoReply`] of a robot with protocol version 5 or less.
+    pub fn settings(&mut self) -> Result<Vec<Setting>, ClientError> {
+        match self.request(Command::GetSettings)? {
+            Outcome::Settings { settings } => Ok(settings.as_slice().to_vec()),
+            other => Err(other.into()),
+        }
+    }
+
+    /// Requests the mode and the settings.
+    ///
+    /// # Errors
+    /// As [`Client::settings`].
+    pub fn modes(&mut self) -> Result<Modes, ClientError> {
+        Ok(Modes { localise_only: self.info()?.localise_only, settings: self.settings()? })
+    }
+
+    /// Restores a snapshot as [`Client::restore`]. Returns what it changes beside the map, in words; with `keep_settings`
+    /// these changes are reverted.
+    ///
+    /// # Errors
+    /// As [`Client::modes`] and [`Client::restore`].
+    pub fn restore_and_compare(&mut self, snapshot: &[u8], keep_settings: bool) -> Result<Vec<String>, ClientError> {
+        let before = self.modes()?;
+        self.restore(snapshot)?;
+        let after = self.modes()?;
+        let changes = before.changes(&after);
+        if keep_settings {
+            for setting in before.settings.iter().filter(|&setting| !after.settings.contains(setting)) {
+                self.order(Command::SetConfig(*setting))?;
+            }
+            if before.localise_only != after.localise_only {
+                self.order(Command::LocaliseOnly { on: before.localise_only })?;
+            }
+        }
+        Ok(changes)
+    }
+
     /// Requests the whole map and waits until it is complete.
     ///
     /// # Errors
@@ -199,6 +241,30 @@ impl<L: Read + Write, F: FnMut(&Listener, Event<'_>)> Client<L, F> {
             on_event(listener, event);
         });
         Ok(outcome)
+    }
+}
+
+/// What a snapshot changes beside the map.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Modes {
+    /// Whether the robot only localises.
+    pub localise_only: bool,
+    /// Its settings.
+    pub settings: Vec<Setting>,
+}
+
+impl Modes {
+    /// What differs later, in words.
+    fn changes(&self, later: &Self) -> Vec<String> {
+        let value = |setting: Setting| setting::parts(setting).map_or(0, |(_, value)| value);
+        let settings = self.settings.iter().zip(&later.settings).filter(|(before, after)| before != after);
+        let mut changes: Vec<String> =
+            settings.map(|(&before, &after)| format!("{}, was {}", setting::text(after), value(before))).collect();
+        if self.localise_only != later.localise_only {
+            let word = |on| if on { "on" } else { "off" };
+            changes.push(format!("localise-only {}, was {}", word(later.localise_only), word(self.localise_only)));
+        }
+        changes
     }
 }
 

@@ -12,11 +12,12 @@ use toposlam::FaultKind;
 use toposlam::drive::DriveState;
 use toposlam::ring::Echo;
 use toposlam::wire::{
-    Arrival, Belief, Evidence, Exploration, Factors, GoalStatus, Health, Hello, Info, Message, Outcome, Remapped, Row,
-    Velocity, VertexWays, Way, Worst,
+    Arrival, Belief, Command, DecodeError, Evidence, Exploration, Factors, GoalStatus, Health, Hello, Info, Message,
+    Outcome, Refusal, Remapped, Row, Setting, Velocity, VertexWays, Way, Worst,
 };
 
 use crate::listener::Event;
+use crate::setting;
 
 /// Wire units of a logarithm per nat.
 const Q16: f64 = 65536.0;
@@ -24,6 +25,7 @@ const Q16: f64 = 65536.0;
 /// One event as a line of text: the message, the number of frames lost before it, or the decoding error.
 pub fn event(event: Event<'_>) -> String {
     match event {
+        Event::Damaged(error) if is_unknown(error) => format!("unknown: {error}"),
         Event::Damaged(error) => format!("damaged: {error}"),
         Event::Message(header, received) => match header.arrival {
             Arrival::AfterGap { lost } => format!("{} (after {lost} lost frames)", message(received)),
@@ -32,6 +34,11 @@ pub fn event(event: Event<'_>) -> String {
             Arrival::First | Arrival::InOrder => message(received),
         },
     }
+}
+
+/// Whether the frame is intact and of another version: it is not damaged.
+pub const fn is_unknown(error: DecodeError) -> bool {
+    matches!(error, DecodeError::UnknownVersion { .. } | DecodeError::UnknownMessage)
 }
 
 /// One message as a line of text.
@@ -83,7 +90,21 @@ pub fn outcome(outcome: &Outcome) -> String {
             format!("{} bytes from byte {offset} of a snapshot of {total}", bytes.as_slice().len())
         }
         Outcome::Refused(refusal) => format!("refused: {refusal}"),
+        Outcome::Settings { settings } => settings_text(settings.as_slice()).join(", "),
         other => format!("{other:?}"),
+    }
+}
+
+/// Each setting by name.
+pub fn settings_text(settings: &[Setting]) -> Vec<String> {
+    settings.iter().map(|&setting| setting::text(setting)).collect()
+}
+
+/// Why a robot refuses a command. A setting out of range is named with its range.
+pub fn refusal(command: &Command, refusal: Refusal) -> String {
+    match (command, refusal) {
+        (Command::SetConfig(setting), Refusal::OutOfRange) => setting::out_of_range(*setting),
+        _ => refusal.to_string(),
     }
 }
 
@@ -93,7 +114,11 @@ pub fn info(info: &Info) -> Vec<String> {
     let mapping = if info.localise_only { "keeps the map and localises" } else { "maps" };
     let mut lines = vec![
         format!("toposlam {}.{}.{}", version.major, version.minor, version.patch),
-        format!("start {}: {}", info.boot, info.reset_cause),
+        if info.boot == 0 {
+            info.reset_cause.to_string()
+        } else {
+            format!("start {}: {}", info.boot, info.reset_cause)
+        },
         format!("up for {:.1} s", seconds(info.uptime_ms)),
         format!("{}{mapping}", if info.paused { "paused; otherwise it " } else { "" }),
     ];
@@ -139,16 +164,23 @@ pub fn seconds(time_ms: u32) -> f64 {
     f64::from(time_ms) / 1000.0
 }
 
+/// What distinguishes this start of the robot from others.
+pub fn start(hello: &Hello) -> String {
+    let Hello { boot, session, reset_cause, seed, .. } = hello;
+    let number = (*boot != 0).then(|| format!("start {boot}"));
+    let session = (*session != 0).then(|| format!("session {session:08x}"));
+    let names: Vec<String> = number.into_iter().chain(session).collect();
+    format!("{} ({reset_cause}), seed {seed}", if names.is_empty() { "started".to_owned() } else { names.join(", ") })
+}
+
 fn introduction(hello: &Hello) -> String {
     let rooms = hello.capacities;
     format!(
-        "hello: protocol version {}, schema {:#018x}, start {} ({}), seed {}, room for {} vertices, {} hypotheses, \
+        "hello: protocol version {}, schema {:#018x}, {}, room for {} vertices, {} hypotheses, \
          {} places, {} sonars",
         hello.protocol_version,
         hello.schema_hash,
-        hello.boot,
-        hello.reset_cause,
-        hello.seed,
+        start(hello),
         rooms.vertices,
         rooms.hypotheses,
         rooms.history,

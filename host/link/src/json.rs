@@ -13,13 +13,17 @@ use serde_json::{Map, Value, json};
 use toposlam::ring::Echo;
 use toposlam::wire::{Arrival, Echoes, Message};
 
+use crate::event_text;
 use crate::listener::Event;
 
-/// One event. `event` is the name of the message, or `Damaged`; the message's fields follow under their names. `lost`
+/// One event. `event` is the name of the message, `Damaged`, or `Unknown` for an intact frame of another version; the message's fields follow under their names. `lost`
 /// is present if frames are missing before the event.
 pub fn event(event: Event<'_>) -> Value {
     let (header, message) = match event {
-        Event::Damaged(error) => return json!({"event": "Damaged", "error": error.to_string()}),
+        Event::Damaged(error) => {
+            let name = if event_text::is_unknown(error) { "Unknown" } else { "Damaged" };
+            return json!({"event": name, "error": error.to_string()});
+        }
         Event::Message(header, message) => (header, message),
     };
     let mut object = match message {

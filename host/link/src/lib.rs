@@ -1,6 +1,6 @@
 //! The host's end of a robot's serial line.
 //!
-//! [`mod@line`] opens a line; [`broadcast`] is the robot's end of one. [`listener`] decodes bytes into events,
+//! [`mod@line`] opens a line; [`broadcast`] is the robot's end of one, and [`playback`] a recording in the place of a robot. [`listener`] decodes bytes into events,
 //! [`client`] sends requests, [`topology`] holds the map as plain data, and [`layout`] computes positions for drawing
 //! it. [`export`] writes the map in other formats, and `recording` (feature `recording`) records the line. [`link`]
 //! keeps a line open in its own thread, and [`watch`] keeps the newest state of a link. [`event_text`] and [`mod@json`]
@@ -17,6 +17,7 @@ pub mod line;
 pub mod link;
 pub mod listener;
 pub mod merge;
+pub mod playback;
 #[cfg(feature = "recording")]
 pub mod recording;
 pub mod setting;

@@ -16,9 +16,10 @@
 //! ```
 
 use std::cell::{Cell, RefCell};
+use std::fs::File;
 use std::io::{self, Read, Write};
-use std::path::PathBuf;
-use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, TryRecvError, channel};
+use std::path::{Path, PathBuf};
+use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, TryRecvError, sync_channel};
 use std::time::{Duration, Instant};
 use std::{fmt, thread};
 
@@ -27,6 +28,7 @@ use toposlam::wire::{Command, DecodeError, Header, Message, Outcome};
 use crate::client::{Client, ClientError};
 use crate::line::{self, Line};
 use crate::listener::{Event, Listener};
+use crate::setting;
 
 /// Source of a robot's bytes.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -81,14 +83,22 @@ impl Default for Options {
     }
 }
 
+/// The most tasks that wait on a link.
+pub const TASKS: usize = 16;
+
 /// A task for the robot.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Task {
     /// Send one command.
     Command(Command),
-    /// Fetch a snapshot and write it to a file, replacing an existing one.
-    Snapshot(PathBuf),
-    /// Send the snapshot in a file; the robot replaces its map with it.
+    /// Fetch a snapshot and write it to a file.
+    Snapshot {
+        /// The file.
+        file: PathBuf,
+        /// Whether an existing file is replaced.
+        force: bool,
+    },
+    /// Send the snapshot in a file; the robot replaces its map and the settings of its filter with it.
     Restore(PathBuf),
 }
 
@@ -98,7 +108,8 @@ impl fmt::Display for Task {
             Self::Command(Command::Info) => f.write_str("info"),
             Self::Command(Command::GetMap) => f.write_str("get the map"),
             Self::Command(Command::Reset) => f.write_str("reset"),
-            Self::Command(Command::SetConfig(setting)) => write!(f, "set {setting:?}"),
+            Self::Command(Command::GetSettings) => f.write_str("settings"),
+            Self::Command(Command::SetConfig(setting)) => write!(f, "set {}", setting::text(*setting)),
             Self::Command(Command::LocaliseOnly { on: true }) => f.write_str("localise only"),
             Self::Command(Command::LocaliseOnly { on: false }) => f.write_str("continue mapping"),
             Self::Command(Command::GoTo { vertex }) => write!(f, "go to {vertex}"),
@@ -106,21 +117,26 @@ impl fmt::Display for Task {
             Self::Command(Command::Pause { on: true }) => f.write_str("pause"),
             Self::Command(Command::Pause { on: false }) => f.write_str("resume"),
             Self::Command(other) => write!(f, "{other:?}"),
-            Self::Snapshot(file) => write!(f, "snapshot to {}", file.display()),
+            Self::Snapshot { file, .. } => write!(f, "snapshot to {}", file.display()),
             Self::Restore(file) => write!(f, "restore {}", file.display()),
         }
     }
 }
 
 /// The result of a task.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Answer {
     /// The robot's reply to a command; a refusal is a reply.
     Outcome(Outcome),
     /// Number of bytes of the snapshot written to the file.
     Written(usize),
-    /// Number of bytes of the restored snapshot.
-    Restored(usize),
+    /// The restored snapshot.
+    Restored {
+        /// Its number of bytes.
+        bytes: usize,
+        /// What it changed beside the map, in words; `None` if the robot does not report it.
+        changes: Option<Vec<String>>,
+    },
 }
 
 /// Why a task failed.
@@ -187,21 +203,21 @@ impl LinkEvent {
 /// Handle of a link. Dropping it ends the link.
 #[derive(Debug)]
 pub struct Link {
-    tasks: Sender<Task>,
+    tasks: SyncSender<Task>,
 }
 
 impl Link {
     /// Starts a link. The thread of the link calls `on_event` with each event until it returns `false`.
     pub fn start(source: Source, options: Options, on_event: impl FnMut(LinkEvent) -> bool + Send + 'static) -> Self {
-        let (sender, tasks) = channel();
+        let (sender, tasks) = sync_channel(TASKS);
         thread::spawn(move || Worker { source, options, tasks, events: EventSink::new(on_event) }.run());
         Self { tasks: sender }
     }
 
-    /// Queues a task; [`LinkEvent::TaskDone`] has its result. Tasks run one after the other.
+    /// Queues a task; [`LinkEvent::TaskDone`] has its result. Tasks run one after the other. A task beyond [`TASKS`] is dropped.
     pub fn start_task(&self, task: Task) {
         // A link that has ended has already reported it.
-        let _ = self.tasks.send(task);
+        let _ = self.tasks.try_send(task);
     }
 }
 
@@ -327,21 +343,32 @@ impl fmt::Display for LineFailure {
     }
 }
 
+/// A device is written to, and not replaced.
+fn is_device(file: &Path) -> bool {
+    file.exists() && !file.is_file()
+}
+
 fn perform(
     client: &mut Client<Box<dyn Line>, impl FnMut(&Listener, Event<'_>)>,
     task: &Task,
 ) -> Result<Answer, TaskError> {
     Ok(match task {
         Task::Command(command) => Answer::Outcome(client.request(*command)?),
-        Task::Snapshot(file) => {
+        Task::Snapshot { file, force } => {
             let snapshot = client.snapshot()?;
-            std::fs::write(file, &snapshot)?;
+            let mut options = File::options();
+            let options = options.write(true).create(true).truncate(true).create_new(!force && !is_device(file));
+            options.open(file)?.write_all(&snapshot)?;
             Answer::Written(snapshot.len())
         }
         Task::Restore(file) => {
             let snapshot = std::fs::read(file)?;
-            client.restore(&snapshot)?;
-            Answer::Restored(snapshot.len())
+            let changes = match client.modes() {
+                Ok(_) => Some(client.restore_and_compare(&snapshot, false)?),
+                Err(ClientError::Line(error)) => return Err(ClientError::Line(error).into()),
+                Err(_) => client.restore(&snapshot).map(|()| None)?,
+            };
+            Answer::Restored { bytes: snapshot.len(), changes }
         }
     })
 }

@@ -17,7 +17,7 @@ use std::fmt;
 
 use toposlam::wire::{
     Arrival, DecodeError, Decoder, DecoderCounters, Echoes, Header, Hello, HelloError, MapReplica, Message,
-    PROTOCOL_VERSION, Progress, Velocity,
+    PROTOCOL_VERSION, Progress, Start, Velocity,
 };
 
 use crate::topology::TopologicalMap;
@@ -46,6 +46,10 @@ pub struct Listener {
     decoder: Decoder,
     replica: MapReplica<64>,
     latest: Latest,
+    /// The last two starts that differ, the newest first.
+    starts: [Option<Start>; 2],
+    /// Whether a start returned after another one.
+    alternates: bool,
 }
 
 /// The newest values that [`MapReplica`] does not keep.
@@ -83,6 +87,8 @@ pub enum Understanding {
     },
     /// The robot's messages have another schema: the decoded values are not reliable.
     Not(HelloError),
+    /// The frames of several robots alternate on the line: each replaces the state of the other.
+    Several,
 }
 
 impl Understanding {
@@ -108,6 +114,7 @@ impl fmt::Display for Understanding {
                 )
             }
             Self::Not(error) => write!(f, "not understood: {error}"),
+            Self::Several => f.write_str("several robots send on this line, and each replaces the map of the other"),
         }
     }
 }
@@ -121,7 +128,13 @@ impl Default for Listener {
 impl Listener {
     /// A listener that has received nothing.
     pub fn new() -> Self {
-        Self { decoder: Decoder::new(), replica: MapReplica::new(), latest: Latest::default() }
+        Self {
+            decoder: Decoder::new(),
+            replica: MapReplica::new(),
+            latest: Latest::default(),
+            starts: [None; 2],
+            alternates: false,
+        }
     }
 
     /// Decodes bytes in pieces of any length. Calls back with each event and with the listener's state after it.
@@ -151,6 +164,7 @@ impl Listener {
             Arrival::First | Arrival::InOrder | Arrival::AfterGap { .. } => {}
         }
         match *message {
+            Message::Hello(hello) => self.note(hello.start()),
             Message::Ring { frame_index, echoes } => self.latest.ring = Some((frame_index, echoes)),
             Message::Velocity(velocity) => self.latest.velocity = Some(velocity),
             Message::Place { place_index, frame_index, radius_mm, degree } => {
@@ -160,9 +174,21 @@ impl Listener {
         }
     }
 
-    /// Prepares for a reopened line: keeps the state and discards an incomplete frame.
+    /// A start that returns after another one is not a restart: two robots send.
+    fn note(&mut self, start: Start) {
+        let [newest, before] = self.starts;
+        if newest != Some(start) {
+            self.alternates |= before == Some(start);
+            self.starts = [Some(start), newest];
+        }
+    }
+
+    /// Prepares for a reopened line: keeps the state and discards an incomplete frame. Another robot may be at the other end.
     pub fn reconnected(&mut self, mut on_event: impl FnMut(&Self, Event<'_>)) {
         self.feed(&[0], &mut on_event);
+        self.decoder.reconnected();
+        self.starts = [None; 2];
+        self.alternates = false;
     }
 
     /// The replica of the robot's map and state.
@@ -182,7 +208,7 @@ impl Listener {
 
     /// Compatibility with the robot's protocol.
     pub fn understanding(&self) -> Understanding {
-        Understanding::of(self.replica.hello())
+        if self.alternates { Understanding::Several } else { Understanding::of(self.replica.hello()) }
     }
 
     /// The newest ring frame: its index and the echo of each sonar.
@@ -204,7 +230,10 @@ impl Listener {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use toposlam::wire::{Capacities, Encoder, MAX_FRAME_BYTES, ResetCause};
+    use toposlam::FaultKind;
+    use toposlam::wire::{
+        Belief, Capacities, Encoder, GoalState, GoalStatus, List, Location, MAX_FRAME_BYTES, ResetCause,
+    };
 
     fn listener_of(hello: Hello) -> Listener {
         let mut frame = [0; MAX_FRAME_BYTES];
@@ -213,9 +242,7 @@ mod tests {
         listener
     }
 
-    #[test]
-    fn a_version_mismatch_reports_both_versions() {
-        assert_eq!(Listener::new().understanding(), Understanding::Unknown);
+    const HELLO: Hello = {
         let capacities = Capacities {
             vertices: 16,
             hypotheses: 10,
@@ -224,11 +251,68 @@ mod tests {
             fingerprint_step_mm: 4,
             sonars: 16,
         };
-        let hello = Hello::new(1, ResetCause::PowerOn, 1, capacities);
+        Hello { session: 77, ..Hello::new(0, ResetCause::PowerOn, 1, capacities) }
+    };
+
+    fn send(listener: &mut Listener, encoder: &mut Encoder, messages: &[Message]) {
+        for message in messages {
+            listener.feed(encoder.encode(message, &mut [0; MAX_FRAME_BYTES]).unwrap(), |_, _| ());
+        }
+    }
+
+    /// The same robot at two starts, with a gap in the numbers that may as well be lost frames.
+    #[test]
+    fn no_state_of_the_session_before_a_restart_is_left() {
+        let ring = |frame_index| Message::Ring { frame_index, echoes: Echoes::EMPTY };
+        let before = [
+            Message::Hello(HELLO),
+            Message::Edge { a: 0, b: 1, present: true },
+            Message::Vertex { vertex: 0, radius_mm: 1000, visits: 1 },
+            Message::Vertex { vertex: 1, radius_mm: 1000, visits: 1 },
+            Message::Location(Location { place_index: 4, vertex: 1 }),
+            Message::Belief(Belief { place_index: 4, map_permille: 1000, vertices: List::new([]) }),
+            Message::GoalStatus(GoalStatus { vertex: 0, state: GoalState::Active }),
+            Message::Fault { kind: FaultKind::BusError as u8, count: 3 },
+            Message::Place { place_index: 4, frame_index: 900, radius_mm: 1000, degree: None },
+            ring(900),
+        ];
+        let hello = Message::Hello(Hello { session: 78, ..HELLO });
+        for (first, restarts_by) in [(hello, "session"), (ring(30), "clock")] {
+            let mut listener = Listener::new();
+            send(&mut listener, &mut Encoder::new(0), &before);
+            assert_eq!((listener.map().edges.len(), listener.replica().fault(FaultKind::BusError)), (1, 3));
+            listener.reconnected(|_, _| ());
+            send(&mut listener, &mut Encoder::new(500), &[first, hello]);
+            let replica = listener.replica();
+            assert_eq!((replica.vertices(), replica.edges().count()), (0, 0), "{restarts_by}");
+            assert_eq!((replica.location(), replica.belief(), replica.goal_status()), (None, None, None));
+            assert_eq!((replica.fault(FaultKind::BusError), listener.sighting()), (0, None));
+            assert_eq!((replica.hello().unwrap().session, listener.counters().restarts), (78, 1));
+            assert!(!replica.is_converged());
+            assert_eq!(listener.understanding(), Understanding::Whole);
+        }
+    }
+
+    #[test]
+    fn two_robots_on_one_line_are_not_taken_for_one_that_restarts() {
+        let other = Hello { session: 78, ..HELLO };
+        let mut listener = Listener::new();
+        for (number, hello) in [HELLO, other].into_iter().cycle().take(4).enumerate() {
+            assert_eq!(listener.understanding() == Understanding::Several, number > 2, "{number}");
+            send(&mut listener, &mut Encoder::new(number as u16), &[Message::Hello(hello)]);
+        }
+        listener.reconnected(|_, _| ());
+        assert_eq!(listener.understanding(), Understanding::Whole);
+    }
+
+    #[test]
+    fn a_version_mismatch_reports_both_versions() {
+        assert_eq!(Listener::new().understanding(), Understanding::Unknown);
+        let hello = HELLO;
         assert_eq!(listener_of(hello).understanding(), Understanding::Whole);
         let newer = Hello { protocol_version: PROTOCOL_VERSION + 1, ..hello };
         let text = listener_of(newer).understanding().to_string();
-        assert!(text.contains("version 6, this program 5"), "{text}");
+        assert!(text.contains("version 7, this program 6"), "{text}");
         let other = Hello { schema_hash: 7, ..hello };
         assert!(matches!(listener_of(other).understanding(), Understanding::Not(_)));
     }

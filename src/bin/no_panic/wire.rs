@@ -101,7 +101,7 @@ pub(crate) fn commands() {
     }
     let request = Request { id: black_box(1), command: toposlam::wire::Command::Info.opaque() };
     black_box(Encoder::new(black_box(9)).encode(&request, frame).is_ok());
-    black_box((request.boot(), inbox.faults(), crc32(black_box(&[1, 2, 3])), Version::LIBRARY));
+    black_box((request.start(), request.clock(), inbox.faults(), crc32(black_box(&[1, 2, 3])), Version::LIBRARY));
     let settings = Settings {
         filter: RobustConfig::default().opaque(),
         place: PlaceConfig::default().opaque(),

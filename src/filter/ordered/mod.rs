@@ -252,6 +252,10 @@ impl<const N: usize, const V: usize, const D: usize, const T: usize> Filter<V> f
         Ok(())
     }
 
+    fn config(&self) -> &OrderedConfig {
+        &self.config
+    }
+
     /// Computes the evidence of all labels again. The other evidence of the places so far stays as it is, and the estimate of the
     /// noise starts again from the configured value.
     fn set_config(&mut self, config: OrderedConfig) -> Result<(), ConfigError> {
@@ -346,6 +350,14 @@ impl<const N: usize, const V: usize, const D: usize, const T: usize> Filter<V> f
 
     fn is_in_doubt(&self) -> bool {
         self.has_unexplained_ngram()
+    }
+
+    fn set_localise_only(&mut self, localise_only: bool) {
+        Self::set_localise_only(self, localise_only);
+    }
+
+    fn is_localise_only(&self) -> bool {
+        Self::is_localise_only(self)
     }
 }
 

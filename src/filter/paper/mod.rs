@@ -164,11 +164,6 @@ impl<const N: usize, const V: usize, const WORDS: usize> PaperFilter<N, V, WORDS
     pub fn observed(&self) -> u32 {
         self.observed
     }
-
-    /// The configuration in use.
-    pub fn config(&self) -> &PaperConfig {
-        &self.config
-    }
 }
 
 /// The paper's filter reads the fingerprint of an observation alone, and it does not refine. The best particle has one vertex, so
@@ -198,6 +193,10 @@ impl<const N: usize, const V: usize, const WORDS: usize> Filter<V> for PaperFilt
         self.consistency.forget();
         self.faults = FaultCounters::new();
         Ok(())
+    }
+
+    fn config(&self) -> &PaperConfig {
+        &self.config
     }
 
     fn set_config(&mut self, config: PaperConfig) -> Result<(), ConfigError> {

@@ -247,6 +247,10 @@ impl<const N: usize, const V: usize, const HISTORY: usize> Filter<V> for RobustF
         Ok(())
     }
 
+    fn config(&self) -> &RobustConfig {
+        &self.config
+    }
+
     /// Computes the evidence of all hypotheses again. The estimate of the noise starts again from the configured value.
     fn set_config(&mut self, config: RobustConfig) -> Result<(), ConfigError> {
         config.check(N)?;

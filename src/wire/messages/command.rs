@@ -70,4 +70,6 @@ pub enum Command {
         /// Whether the robot pauses.
         on: bool,
     },
+    /// Requests the settings; the outcome is [`Outcome::Settings`](super::Outcome::Settings).
+    GetSettings,
 }

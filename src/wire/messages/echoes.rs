@@ -50,7 +50,7 @@ impl Echoes {
         })
     }
 
-    fn codes(&self) -> impl Iterator<Item = u16> + '_ {
+    pub(crate) fn codes(&self) -> impl Iterator<Item = u16> + '_ {
         self.codes.iter().copied().take(usize::from(self.count))
     }
 }

@@ -2,19 +2,19 @@
 
 use core::fmt;
 
-use serde::{Deserialize, Serialize};
+use serde::{Deserialize, Deserializer, Serialize};
 
 use super::code::codes;
-use super::{Belief, Echoes, Evidence, Exploration, GoalStatus, Remapped, Reply, Velocity, VertexWays, Worst};
+use super::{Belief, Echoes, Evidence, Exploration, GoalStatus, Remapped, Reply, Start, Velocity, VertexWays, Worst};
 use crate::filter::{Filter, FilterCapacities, Update};
 use crate::mapper::MapperConfig;
 use crate::place::Fingerprint;
 
 /// The version of the messages and requests.
-pub const PROTOCOL_VERSION: u16 = 5;
+pub const PROTOCOL_VERSION: u16 = 6;
 
 /// The 64-bit FNV-1a hash of the schema in `docs/wire.md`; a test computes it from the types.
-pub const SCHEMA_HASH: u64 = 0x8409_EFC8_CE2D_743A;
+pub const SCHEMA_HASH: u64 = 0x3BC2_F178_DFCA_A82F;
 
 /// A message from the robot. Every message but [`Message::Remapped`] gives absolute values, not increments.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -107,7 +107,7 @@ pub struct Hello {
     pub protocol_version: u16,
     /// The [`SCHEMA_HASH`] of the robot.
     pub schema_hash: u64,
-    /// A number that differs from one start of the robot to the next (a counter in flash, or noise); 0 if there is none.
+    /// The number of the start; 0 if the robot does not count them.
     pub boot: u32,
     /// Why the robot started.
     pub reset_cause: ResetCause,
@@ -115,12 +115,27 @@ pub struct Hello {
     pub seed: u64,
     /// The capacities of the robot.
     pub capacities: Capacities,
+    /// The session id: a number that differs from one start to the next, and from robot to robot. 0 if there is none, as in
+    /// protocol version 5.
+    #[serde(deserialize_with = "or_zero")]
+    pub session: u32,
+}
+
+/// A number that older senders leave out.
+fn or_zero<'de, D: Deserializer<'de>>(deserializer: D) -> Result<u32, D::Error> {
+    Ok(u32::deserialize(deserializer).unwrap_or(0))
 }
 
 impl Hello {
-    /// The introduction of a robot that runs this version of the library.
+    /// The introduction of a robot that runs this version of the library, without a session id.
     pub const fn new(boot: u32, reset_cause: ResetCause, seed: u64, capacities: Capacities) -> Self {
-        Self { protocol_version: PROTOCOL_VERSION, schema_hash: SCHEMA_HASH, boot, reset_cause, seed, capacities }
+        let (protocol_version, schema_hash) = (PROTOCOL_VERSION, SCHEMA_HASH);
+        Self { protocol_version, schema_hash, boot, reset_cause, seed, capacities, session: 0 }
+    }
+
+    /// What distinguishes this start of the robot.
+    pub const fn start(&self) -> Start {
+        Start { session: self.session, boot: self.boot, reset_cause: self.reset_cause, seed: self.seed }
     }
 
     /// Checks that this version of the library understands the robot.

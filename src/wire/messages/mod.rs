@@ -22,9 +22,9 @@ pub use message::{
     Capacities, Health, Hello, HelloError, Location, Message, PROTOCOL_VERSION, ResetCause, Row, SCHEMA_HASH,
 };
 pub use navigation::{GoalState, GoalStatus, Velocity};
-pub use payload::Payload;
+pub use payload::{Clock, Payload, Start};
 pub use reply::{Info, Outcome, Refusal, Reply, Version};
-pub use setting::{FilterSettings, Setting, Settings};
+pub use setting::{FilterSettings, SETTINGS_MAX, Setting, Settings};
 pub use ways::{Exploration, VertexWays, Way, WayId};
 
 pub(in crate::wire) use message::bit;

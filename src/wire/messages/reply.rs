@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use super::code::codes;
-use super::{Chunk, ResetCause};
+use super::{Chunk, List, ResetCause, SETTINGS_MAX, Setting};
 
 /// The reply to a request.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -15,8 +15,10 @@ pub struct Reply {
 }
 
 /// The outcome of a request. Append-only.
+// The tag of `Done` is 0, so that a `static` robot is in `.bss`; the compiler's own choice depends on the variants.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[non_exhaustive]
+#[repr(u8)]
 pub enum Outcome {
     /// The command was accepted.
     Done,
@@ -33,6 +35,11 @@ pub enum Outcome {
     },
     /// The command was refused; nothing has changed.
     Refused(Refusal),
+    /// The settings of the robot.
+    Settings {
+        /// Those that the robot has, in the order of their numbers.
+        settings: List<Setting, SETTINGS_MAX>,
+    },
 }
 
 impl From<Refusal> for Outcome {
@@ -125,6 +132,8 @@ codes! {
         BadSnapshot = 10 => "the snapshot is of another version or other capacities, or invalid",
         /// Another operation must finish first.
         Busy = 11 => "another operation must finish first",
+        /// A recording is played, and it takes no commands.
+        Recording = 12 => "it is a recording, not a robot",
     }
 }
 

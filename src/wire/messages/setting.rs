@@ -2,9 +2,12 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::Refusal;
+use super::{List, Refusal};
 use crate::filter::{OrderedConfig, PaperConfig, RobustConfig};
 use crate::place::PlaceConfig;
+
+/// The most settings of a robot.
+pub const SETTINGS_MAX: usize = 16;
 
 /// One setting and its value. Append-only; every value is a `u16`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -30,6 +33,12 @@ pub enum Setting {
     SnapshotEveryPlaces(u16),
 }
 
+impl Default for Setting {
+    fn default() -> Self {
+        Self::NoiseMm(0)
+    }
+}
+
 /// The settings of a filter, as the robot and its line see them.
 pub trait FilterSettings: Copy {
     /// Zero in every field: the settings of a robot that was not started.
@@ -41,6 +50,9 @@ pub trait FilterSettings: Copy {
     /// [`Refusal::Unsupported`] for a setting that the filter does not have, [`Refusal::OutOfRange`] for a value that its field
     /// cannot hold.
     fn change(&mut self, setting: Setting) -> Result<(), Refusal>;
+
+    /// The settings of the filter, in the order of their numbers.
+    fn settings(&self) -> impl Iterator<Item = Setting>;
 
     /// Whether every field is in its range, for a filter with room for this many hypotheses.
     fn is_valid(&self, hypotheses: usize) -> bool;
@@ -65,6 +77,17 @@ impl FilterSettings for RobustConfig {
         Ok(())
     }
 
+    fn settings(&self) -> impl Iterator<Item = Setting> {
+        [
+            Setting::NoiseMm(self.noise_mm),
+            Setting::Hypotheses(self.hypotheses.into()),
+            Setting::Moves(self.moves.into()),
+            Setting::WrongTurnPermille(self.wrong_turn_permille),
+            Setting::WrongDegreePermille(self.wrong_degree_permille),
+        ]
+        .into_iter()
+    }
+
     fn is_valid(&self, hypotheses: usize) -> bool {
         self.check(hypotheses).is_ok()
     }
@@ -79,6 +102,10 @@ impl FilterSettings for OrderedConfig {
             _ => return Err(Refusal::Unsupported),
         }
         Ok(())
+    }
+
+    fn settings(&self) -> impl Iterator<Item = Setting> {
+        [Setting::NoiseMm(self.noise_mm)].into_iter()
     }
 
     fn is_valid(&self, _: usize) -> bool {
@@ -96,6 +123,10 @@ impl FilterSettings for PaperConfig {
             _ => return Err(Refusal::Unsupported),
         }
         Ok(())
+    }
+
+    fn settings(&self) -> impl Iterator<Item = Setting> {
+        [Setting::NoiseMm(self.sigma_label_mm), Setting::Hypotheses(self.particles.into())].into_iter()
     }
 
     fn is_valid(&self, hypotheses: usize) -> bool {
@@ -117,6 +148,17 @@ pub struct Settings<C> {
 }
 
 impl<C: FilterSettings> Settings<C> {
+    /// Every setting, in the order of their numbers.
+    pub fn list(&self) -> List<Setting, SETTINGS_MAX> {
+        let others = [
+            Setting::EquidistanceMm(self.place.equidistance_mm),
+            Setting::LeaveMm(self.place.leave_mm),
+            Setting::SpeedPermille(self.speed_permille),
+            Setting::SnapshotEveryPlaces(self.snapshot_every_places),
+        ];
+        List::new(self.filter.settings().chain(others))
+    }
+
     /// The settings with one of them changed, for a robot of these capacities.
     ///
     /// # Errors
@@ -175,6 +217,18 @@ mod tests {
                 assert_eq!(seven.with(setting(value), 7, 16), Err(Refusal::OutOfRange), "{:?}", setting(value));
             }
         }
+    }
+
+    #[test]
+    fn the_list_has_every_setting_of_the_robot_in_order_and_restores_it() {
+        let list = SETTINGS.list();
+        assert_eq!((list.as_slice().len(), list.as_slice()[0]), (9, Setting::NoiseMm(SETTINGS.filter.noise_mm)));
+        let changed = SETTINGS.with(Setting::Hypotheses(3), 7, 16).unwrap().with(Setting::LeaveMm(500), 7, 16).unwrap();
+        let with = |settings: Settings<_>, &setting: &Setting| settings.with(setting, 10, 16).unwrap();
+        assert_eq!(list.as_slice().iter().fold(changed, with), SETTINGS);
+        let Settings { place, speed_permille, snapshot_every_places, .. } = SETTINGS;
+        let ordered = Settings { filter: OrderedConfig::DEFAULT, place, speed_permille, snapshot_every_places };
+        assert_eq!(ordered.list().as_slice().len(), 5);
     }
 
     #[test]

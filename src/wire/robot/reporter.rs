@@ -56,6 +56,7 @@ impl<const V: usize> Reporter<V> {
                 reset_cause: ResetCause::Unknown,
                 seed: 0,
                 capacities,
+                session: 0,
             },
             ticks_per_hello: 0,
             ticks_to_hello: 0,
@@ -90,6 +91,11 @@ impl<const V: usize> Reporter<V> {
         self.fault_turn = 0;
         self.sends_full = false;
         self.refused = 0;
+    }
+
+    /// Sets the session id of the `Hello`.
+    pub fn set_session(&mut self, session: u32) {
+        self.hello.session = session;
     }
 
     /// Starts a new round of the repeated map with a `Hello`, at four pieces per tick; the next round has the usual pace

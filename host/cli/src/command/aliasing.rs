@@ -1,8 +1,9 @@
 //! `toposlam aliasing`: which n-grams tell places with equal labels apart.
 
-use anyhow::{Context, ensure};
+use anyhow::ensure;
 use clap::Args;
-use std::{fs, num::NonZeroUsize, path::PathBuf};
+use std::{num::NonZeroUsize, path::PathBuf};
+use toposlam_cli::{outln, output};
 use toposlam_eval::aliasing::{GraphKind, Study, figure::draw};
 
 /// Arguments of `toposlam aliasing`.
@@ -29,6 +30,9 @@ pub(crate) struct Arguments {
     /// Draw the result to this file.
     #[arg(long, value_name = "FILE.svg")]
     plot: Option<PathBuf>,
+    /// Replace an existing file.
+    #[arg(long)]
+    force: bool,
     /// Print every environment as JSON instead of a table.
     #[arg(long)]
     json: bool,
@@ -37,6 +41,9 @@ pub(crate) struct Arguments {
 pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     ensure!(arguments.places.iter().all(|places| (3..=64).contains(places)), "--places: must be 3 to 64");
     ensure!(arguments.degree.iter().all(|degree| (1.0..=5.0).contains(degree)), "--degree: must be 1 to 5");
+    if let Some(file) = &arguments.plot {
+        output::check(file, arguments.force)?;
+    }
     let study = Study {
         kinds: arguments.degree.iter().map(|&degree| GraphKind::Planar(degree)).chain([GraphKind::Grid]).collect(),
         places: arguments.places.clone(),
@@ -47,12 +54,12 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     };
     let report = study.run()?;
     if let Some(file) = &arguments.plot {
-        fs::write(file, draw(&report)).with_context(|| format!("--plot {}", file.display()))?;
+        output::write_file(file, draw(&report), arguments.force)?;
     }
     if arguments.json {
-        println!("{}", serde_json::to_string(&report)?);
+        outln!("{}", serde_json::to_string(&report)?)?;
     } else {
-        print!("{report}");
+        output::write_bytes(report.to_string().as_bytes())?;
     }
     Ok(())
 }

@@ -1,15 +1,25 @@
 //! `toposlam command`: send a command to a robot over its line.
 
+use std::cell::{Cell, RefCell};
 use std::path::PathBuf;
+use std::time::{Duration, Instant};
 
-use anyhow::Context;
+use anyhow::{Context, bail, ensure};
 use clap::{Args, Subcommand, ValueEnum};
-use toposlam::wire::{Command, MapReplica};
-use toposlam_link::client::Client;
+use toposlam::wire::{Command, GoalState, GoalStatus, MapReplica, Message, Outcome};
+use toposlam_cli::output::ExitError;
+use toposlam_cli::{errln, outln, output};
+use toposlam_link::client::{Client, ClientError};
 use toposlam_link::line::{Line, open};
 use toposlam_link::listener::{Event, Listener};
 use toposlam_link::topology::TopologicalMap;
 use toposlam_link::{event_text, setting};
+
+/// Exit statuses of `go-to --wait`.
+const GAVE_UP: u8 = 3;
+const TIMED_OUT: u8 = 4;
+/// Interval at which the state of the robot is requested while it drives.
+const ASK: Duration = Duration::from_secs(10);
 
 /// Arguments of `toposlam command`.
 #[derive(Args)]
@@ -31,7 +41,7 @@ pub(crate) struct Arguments {
 
 #[derive(Subcommand)]
 enum Action {
-    /// Print version, settings and state of the robot.
+    /// Print version, mode, settings and state of the robot.
     Info,
     /// Print the map.
     Map,
@@ -39,14 +49,26 @@ enum Action {
     Snapshot {
         /// File to write.
         file: PathBuf,
+        /// Replace an existing file.
+        #[arg(long)]
+        force: bool,
     },
-    /// Replace the map by that of a snapshot.
+    /// Replace the map, the settings of the filter and localise-only by those of a snapshot, and print what has changed.
     Restore {
         /// File written by `snapshot`.
         file: PathBuf,
+        /// Keep the settings and localise-only of the robot.
+        #[arg(long)]
+        keep_settings: bool,
     },
     /// Delete the map and restart mapping.
     Reset,
+    /// Print the settings, or one of them.
+    Get {
+        /// Name of the setting [default: all].
+        #[arg(value_parser = setting::NAMES)]
+        name: Option<String>,
+    },
     /// Change a setting.
     Set {
         /// Name of the setting.
@@ -64,6 +86,12 @@ enum Action {
     GoTo {
         /// Number of the vertex.
         vertex: u8,
+        /// Wait for the arrival. Exit status: 0 at the vertex, 3 if the robot gives up, 4 after the time.
+        #[arg(long)]
+        wait: bool,
+        /// Longest wait, in seconds.
+        #[arg(long, value_name = "SECONDS", default_value_t = 600.0, requires = "wait", value_parser = seconds)]
+        wait_s: f64,
     },
     /// Explore the building.
     Explore,
@@ -82,21 +110,41 @@ enum Switch {
 
 pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     let line = open(&arguments.line, arguments.baud)?;
+    if let Action::GoTo { vertex, wait: true, wait_s } = arguments.action {
+        return go_to(line, arguments, vertex, wait_s);
+    }
     let mut client = Client::new(line, rand::random(), |_: &Listener, _: Event<'_>| {});
-    client.timeout = std::time::Duration::from_millis(arguments.timeout_ms);
+    client.timeout = Duration::from_millis(arguments.timeout_ms);
     client.attempts = arguments.attempts;
     match &arguments.action {
-        Action::Info => println!("{}", event_text::info(&client.info()?).join("\n")),
-        Action::Map => print_map(client.map()?),
-        Action::Snapshot { file } => {
-            let snapshot = client.snapshot()?;
-            std::fs::write(file, &snapshot).with_context(|| format!("writing {}", file.display()))?;
-            println!("{} bytes", snapshot.len());
+        Action::Info => {
+            outln!("{}", event_text::info(&client.info()?).join("\n"))?;
+            match client.settings() {
+                Ok(settings) => outln!("{}", event_text::settings_text(&settings).join("\n"))?,
+                Err(ClientError::Line(error)) => return Err(ClientError::Line(error).into()),
+                Err(error) => errln!("the settings: {error}"),
+            }
         }
-        Action::Restore { file } => {
+        Action::Map => print_map(client.map()?)?,
+        Action::Snapshot { file, force } => {
+            output::check(file, *force)?;
+            let snapshot = client.snapshot()?;
+            output::write_file(file, &snapshot, *force)?;
+            outln!("{} bytes", snapshot.len())?;
+        }
+        Action::Restore { file, keep_settings } => {
             let snapshot = std::fs::read(file).with_context(|| format!("reading {}", file.display()))?;
-            client.restore(&snapshot)?;
-            println!("{} bytes restored", snapshot.len());
+            restore(&mut client, &snapshot, *keep_settings)?;
+        }
+        Action::Get { name } => {
+            let settings = client.settings()?;
+            let is_wanted = |known: &str| name.as_deref().is_none_or(|name| name == known);
+            let chosen: Vec<_> = settings.iter().filter_map(|&setting| setting::parts(setting)).collect();
+            let chosen: Vec<_> = chosen.into_iter().filter(|(known, _)| is_wanted(known)).collect();
+            ensure!(!chosen.is_empty(), "the robot has no such setting");
+            for (name, value) in chosen {
+                outln!("{name} {value}")?;
+            }
         }
         Action::Reset => order(&mut client, Command::Reset)?,
         Action::Set { name, value } => {
@@ -106,33 +154,109 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
         Action::LocaliseOnly { state } => {
             order(&mut client, Command::LocaliseOnly { on: *state == Switch::On })?;
         }
-        Action::GoTo { vertex } => order(&mut client, Command::GoTo { vertex: *vertex })?,
+        Action::GoTo { vertex, .. } => order(&mut client, Command::GoTo { vertex: *vertex })?,
         Action::Explore => order(&mut client, Command::Explore)?,
         Action::Pause { state } => order(&mut client, Command::Pause { on: *state == Switch::On })?,
     }
     Ok(())
 }
 
-fn order(client: &mut Client<Box<dyn Line>, impl FnMut(&Listener, Event<'_>)>, command: Command) -> anyhow::Result<()> {
-    client.order(command)?;
-    println!("done");
+/// Restores a snapshot and prints what it has changed beside the map.
+fn restore(
+    client: &mut Client<Box<dyn Line>, impl FnMut(&Listener, Event<'_>)>,
+    snapshot: &[u8],
+    keep_settings: bool,
+) -> anyhow::Result<()> {
+    let changes = match client.modes() {
+        Ok(_) => client.restore_and_compare(snapshot, keep_settings)?,
+        Err(ClientError::Line(error)) => return Err(ClientError::Line(error).into()),
+        Err(error) => {
+            ensure!(!keep_settings, "--keep-settings needs the settings: {error}");
+            client.restore(snapshot)?;
+            errln!("the robot does not report its settings, which the snapshot may have changed");
+            Vec::new()
+        }
+    };
+    outln!("{} bytes restored", snapshot.len())?;
+    for change in changes {
+        outln!("{}: {change}", if keep_settings { "kept, the snapshot has" } else { "changed" })?;
+    }
     Ok(())
 }
 
-pub(super) fn print_map(replica: &MapReplica<64>) {
+fn order(client: &mut Client<Box<dyn Line>, impl FnMut(&Listener, Event<'_>)>, command: Command) -> anyhow::Result<()> {
+    match client.request(command)? {
+        Outcome::Done => {}
+        Outcome::Refused(refusal) => bail!("the robot refused: {}", event_text::refusal(&command, refusal)),
+        other => return Err(ClientError::from(other).into()),
+    }
+    outln!("done")?;
+    Ok(())
+}
+
+fn seconds(text: &str) -> Result<f64, String> {
+    super::drive::number_in(text, 0.0..=1e6)
+}
+
+/// Sends the robot to a vertex and waits until it is there.
+fn go_to(line: Box<dyn Line>, arguments: &Arguments, vertex: u8, wait_s: f64) -> anyhow::Result<()> {
+    // What was sent before the reply is about the goal before.
+    let (goal, is_sent) = (RefCell::new(None::<GoalStatus>), Cell::new(false));
+    // A final state ends the wait; the status of the next goal follows it.
+    let is_open = || goal.borrow().is_none_or(|goal| goal.state == GoalState::Active);
+    let on_event = |_: &Listener, event: Event<'_>| match event {
+        Event::Message(_, Message::Reply(_)) if !is_sent.replace(true) => *goal.borrow_mut() = None,
+        Event::Message(_, Message::GoalStatus(status)) if is_open() => *goal.borrow_mut() = Some(*status),
+        _ => {}
+    };
+    let mut client = Client::new(line, rand::random(), on_event);
+    client.timeout = Duration::from_millis(arguments.timeout_ms);
+    client.attempts = arguments.attempts;
+    let deadline = Instant::now() + Duration::from_secs_f64(wait_s);
+    order(&mut client, Command::GoTo { vertex })?;
+    let mut asked = Instant::now();
+    loop {
+        let state = goal.borrow().map(|status| status.state);
+        match state {
+            Some(GoalState::Reached) => return Ok(outln!("at vertex {vertex}")?),
+            Some(GoalState::Active) | None => {}
+            Some(state) => return Err(ExitError::new(GAVE_UP, format!("vertex {vertex}: {state}")).into()),
+        }
+        if Instant::now() >= deadline {
+            let text = format!("the robot is not at vertex {vertex} after {wait_s} s, and is still on its way");
+            return Err(ExitError::new(TIMED_OUT, text).into());
+        }
+        // The status is sent once, and may be lost on the line.
+        if asked.elapsed() >= ASK {
+            asked = Instant::now();
+            let info = client.info()?;
+            let is_over = info.goal.is_none() && goal.borrow().is_none();
+            if is_over && client.listener().replica().location().is_some_and(|location| location.vertex == vertex) {
+                return Ok(outln!("at vertex {vertex}")?);
+            }
+            if is_over {
+                return Err(ExitError::new(GAVE_UP, format!("the robot no longer drives to vertex {vertex}")).into());
+            }
+        }
+        client.listen()?;
+    }
+}
+
+pub(super) fn print_map(replica: &MapReplica<64>) -> anyhow::Result<()> {
     let map = TopologicalMap::from(replica);
     let all_edges = map.all_edges();
-    println!("map: {} vertices, {} edges", replica.vertices(), all_edges.len());
+    outln!("map: {} vertices, {} edges", replica.vertices(), all_edges.len())?;
     for row in (0..replica.vertices()).filter_map(|vertex| replica.row(vertex)) {
-        println!("  vertex {:2}: radius {:4} mm, {} visits", row.vertex, row.radius_mm, row.visits);
+        outln!("  vertex {:2}: radius {:4} mm, {} visits", row.vertex, row.radius_mm, row.visits)?;
     }
     let edges = all_edges.iter().map(|([a, b], _)| format!("{}-{}", a.min(b), a.max(b)));
-    println!("  edges: {}", edges.collect::<Vec<_>>().join(" "));
+    outln!("  edges: {}", edges.collect::<Vec<_>>().join(" "))?;
     if !map.ways.is_empty() {
         let frontiers: Vec<String> = map.frontiers().map(|end| format!("{}.{}", end.vertex, end.way)).collect();
-        println!("  frontiers: {}", frontiers.join(" "));
+        outln!("  frontiers: {}", frontiers.join(" "))?;
     }
     if let Some(location) = replica.location() {
-        println!("  at vertex {}", location.vertex);
+        outln!("  at vertex {}", location.vertex)?;
     }
+    Ok(())
 }

@@ -1,7 +1,7 @@
 //! Options and summary shared by `simulate` and `emulate`.
 
 use std::ops::RangeInclusive;
-use std::path::{Path, PathBuf};
+use std::path::{Display, Path, PathBuf};
 
 use anyhow::{Context, ensure};
 use clap::Args;
@@ -10,6 +10,7 @@ use toposlam::reference::SONARS;
 use toposlam::wire::{FilterSettings, map_digest};
 use toposlam::{Darts, FaultCounters, Filter, Map};
 use toposlam_cli::picture::{Drawing, draw};
+use toposlam_cli::{outln, output};
 use toposlam_eval::faults::fault_lines;
 use toposlam_eval::mapping::{has_driven_ways, is_whole, score_path};
 use toposlam_sim::exploration::Exploration;
@@ -21,7 +22,7 @@ use toposlam_sim::world::{GroundTruth, Plan, RobotModel, TrueMap};
 pub(super) struct DriveArguments {
     /// Floor plan: the name of a built-in plan, or a file (docs/plans.md).
     #[arg(long, default_value = "office")]
-    plan: String,
+    plan: PathBuf,
     /// Start of the robot, in metres in the frame of the plan [default: the start of the plan, or its most open place].
     #[arg(long, value_name = "X,Y", value_parser = start, allow_hyphen_values = true)]
     start: Option<(f64, f64)>,
@@ -34,6 +35,9 @@ pub(super) struct DriveArguments {
     /// Write the map over the floor plan to an SVG file.
     #[arg(long, value_name = "FILE")]
     svg: Option<PathBuf>,
+    /// Replace existing files.
+    #[arg(long)]
+    force: bool,
 }
 
 /// A number within a range, both ends included.
@@ -66,9 +70,20 @@ impl DriveArguments {
         Ok((load_plan(&self.plan, self.start)?, hardware.model().with_noise(self.noise)))
     }
 
+    /// Fails if a file that will be written exists, before the drive.
+    pub(super) fn check_files(&self, others: &[&Option<PathBuf>]) -> anyhow::Result<()> {
+        let files = others.iter().copied().chain([&self.svg]).flatten();
+        files.into_iter().try_for_each(|file| output::check(file, self.force))
+    }
+
+    /// Whether existing files are replaced.
+    pub(super) const fn force(&self) -> bool {
+        self.force
+    }
+
     /// The floor plan argument.
-    pub(super) fn plan(&self) -> &str {
-        &self.plan
+    pub(super) fn plan(&self) -> Display<'_> {
+        self.plan.display()
     }
 
     /// The seed of the drive.
@@ -80,22 +95,22 @@ impl DriveArguments {
     pub(super) fn summarise<const V: usize>(&self, drive: &Summary<'_, V>) -> anyhow::Result<()> {
         let Summary { plan, truth, ground_truth, map, darts, is_uncertain, path, faults, .. } = drive;
         let detections = ground_truth.detections();
-        println!("\n{}: {} places in {} visits", self.plan, detections.len(), ground_truth.visits());
-        println!("{}", ground_truth.report());
+        outln!("\n{}: {} places in {} visits", self.plan(), detections.len(), ground_truth.visits())?;
+        outln!("{}", ground_truth.report())?;
         let (vertices, edges) = (map.vertices().len(), map.edges().count());
         let uncertain = if *is_uncertain { ", uncertain" } else { "" };
-        println!("map: {vertices} vertices, {edges} edges, digest {:08x}{uncertain}", map_digest(map, *darts));
+        outln!("map: {vertices} vertices, {edges} edges, digest {:08x}{uncertain}", map_digest(map, *darts))?;
         if let Some(darts) = darts {
-            println!("frontiers: {}", darts.frontiers().count());
+            outln!("frontiers: {}", darts.frontiers().count())?;
         }
-        println!("against the true map: {}", drive.against_truth());
+        outln!("against the true map: {}", drive.against_truth())?;
         for line in fault_lines(faults) {
-            println!("fault {line}");
+            outln!("fault {line}")?;
         }
         let Some(file) = &self.svg else { return Ok(()) };
-        let caption = format!("{}: the map after {} places", self.plan, detections.len());
+        let caption = format!("{}: the map after {} places", self.plan(), detections.len());
         let picture = draw(plan, truth, &Drawing::of_map(map, path, detections, caption));
-        std::fs::write(file, picture).with_context(|| format!("writing {}", file.display()))
+        output::write_file(file, picture, self.force)
     }
 }
 
@@ -159,19 +174,18 @@ fn yes_or_no(answer: bool) -> &'static str {
 }
 
 /// A built-in plan by its name, or a plan from a file, with another start if one is given.
-pub(super) fn load_plan(name_or_file: &str, start: Option<(f64, f64)>) -> anyhow::Result<Plan> {
-    let plan = match Plan::built_in(name_or_file) {
+pub(super) fn load_plan(file: &Path, start: Option<(f64, f64)>) -> anyhow::Result<Plan> {
+    let plan = match file.to_str().and_then(Plan::built_in) {
         Some(plan) => plan,
         None => {
-            let file = Path::new(name_or_file);
             let names = Plan::BUILT_IN.map(|(name, _)| name).join(", ");
-            ensure!(file.exists(), "{name_or_file:?} is neither a built-in floor plan ({names}) nor a readable file");
+            ensure!(file.exists(), "{file:?} is neither a built-in floor plan ({names}) nor a readable file");
             Plan::load(file).context("floor plan")?
         }
     };
     let Some((x_m, y_m)) = start else { return Ok(plan) };
     let plan = plan.with_start_m(x_m, y_m);
-    ensure!(!plan.is_wall_at(plan.start()), "--start {x_m},{y_m} is in a wall of {name_or_file} or outside it");
+    ensure!(!plan.is_wall_at(plan.start()), "--start {x_m},{y_m} is in a wall of {} or outside it", file.display());
     Ok(plan)
 }
 

@@ -18,6 +18,8 @@ use toposlam::robot::RobotConfig;
 use toposlam::wire::{Belief, Evidence, FilterSettings, Location, Message, VertexWays, Worst};
 use toposlam::{Filter, VertexId};
 use toposlam_cli::emulator::Emulation;
+use toposlam_cli::outln;
+use toposlam_cli::output::OutputError;
 use toposlam_cli::progress::Progress;
 use toposlam_sim::exploration::Exploration;
 use toposlam_sim::injector::FaultRates;
@@ -75,9 +77,12 @@ const VELOCITY_TIMEOUT: Duration = Duration::from_secs(10);
 struct Repetition<'buffer, const V: usize, F: Filter<V>> {
     exploration: Exploration<'buffer, V, F>,
     velocities: Vec<VelocityCommand>,
+    /// Why the standard output ended the run.
+    unprinted: Option<OutputError>,
 }
 
 pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
+    arguments.drive.check_files(&[])?;
     if arguments.robot != RobotArgument::Reference {
         ensure!(arguments.faults == 0.0, "faults are emulated with the reference robot only");
         ensure!(arguments.filter == REFERENCE, "the small robot has the ordered filter only");
@@ -145,6 +150,7 @@ where
     let repetition = Mutex::new(Repetition {
         exploration: Exploration::<V, F>::with_robot(&plan, model, arguments.drive.seed(), robot, buffer)?,
         velocities: Vec::new(),
+        unprinted: None,
     });
     let (tell_velocity, velocities) = mpsc::channel::<VelocityCommand>();
     let progress = Progress::new("", arguments.places, "places");
@@ -169,8 +175,12 @@ where
             if repetition.exploration.map(&frame).is_some()
                 && let Some(step) = repetition.exploration.steps().last()
             {
-                bar.println(step);
+                let printed = bar.println(step);
+                repetition.unprinted = printed.err();
                 bar.increment();
+            }
+            if repetition.unprinted.is_some() {
+                return None;
             }
             let velocity = repetition.exploration.board().velocity;
             repetition.velocities.push(velocity);
@@ -203,22 +213,24 @@ where
         },
     )?;
     drop(progress);
+    let Ok(Repetition { exploration, unprinted, .. }) = repetition.into_inner() else { bail!("the simulation failed") };
+    if let Some(error) = unprinted {
+        return Err(error.into());
+    }
     if let Some(message) = elsewhere {
         bail!("the firmware sent {message:?}, which differs from the simulation");
     }
-
-    let Ok(Repetition { exploration, .. }) = repetition.into_inner() else { bail!("the simulation failed") };
     arguments.drive.summarise(&Summary::of(&plan, &exploration))?;
     let counters = received.decoder.counters();
     let Some(health) = received.replica.health() else { bail!("the firmware sent no Health message") };
-    println!("firmware: {} places in {} frames, {:.1} s", received.places.len(), outcome.frames, outcome.seconds);
-    println!("wire: {} messages, {} frames lost, {} corrupt", counters.messages, counters.lost, counters.corrupt);
-    println!("sensor bus: {} bytes, {} rounds of the loop", outcome.bus_bytes, health.loop_count);
+    outln!("firmware: {} places in {} frames, {:.1} s", received.places.len(), outcome.frames, outcome.seconds)?;
+    outln!("wire: {} messages, {} frames lost, {} corrupt", counters.messages, counters.lost, counters.corrupt)?;
+    outln!("sensor bus: {} bytes, {} rounds of the loop", outcome.bus_bytes, health.loop_count)?;
     if let Some(bytes) = outcome.stack_high_water_bytes {
-        println!("stack_high_water_bytes: {bytes}");
+        outln!("stack_high_water_bytes: {bytes}")?;
     }
     compare(&exploration, &received)?;
-    println!("drive and map of the firmware and of the simulation are equal bit for bit");
+    outln!("drive and map of the firmware and of the simulation are equal bit for bit")?;
     Ok(())
 }
 

@@ -11,6 +11,7 @@ use anyhow::{Context, bail, ensure};
 use toposlam::reference::small::{self, DARTS, Filter, HISTORY, HYPOTHESES, VERTICES};
 use toposlam::wire::{Decoder, Message, Progress as Decoded};
 use toposlam_cli::emulator::microbit::Microbit;
+use toposlam_cli::outln;
 use toposlam_cli::progress::Progress;
 use toposlam_sim::exploration::Exploration;
 
@@ -58,7 +59,7 @@ pub(super) fn run<const SONARS: usize>(
         if exploration.map(&frame).is_some()
             && let Some(step) = exploration.steps().last()
         {
-            progress.println(step);
+            progress.println(step)?;
             progress.increment();
         }
         let board = exploration.board();
@@ -74,10 +75,10 @@ pub(super) fn run<const SONARS: usize>(
     let printed = microbit.end()?;
     drive.summarise(&Summary::of(&plan, &exploration))?;
     print_figures(&printed)?;
-    println!(
+    outln!(
         "capacities: {SONARS} sonars, {HYPOTHESES} hypotheses, {VERTICES} vertices, {DARTS} darts, {HISTORY} places"
-    );
-    println!("all {messages} messages of the firmware and of the simulation are equal bit for bit");
+    )?;
+    outln!("all {messages} messages of the firmware and of the simulation are equal bit for bit")?;
     Ok(())
 }
 
@@ -138,16 +139,16 @@ fn print_figures(printed: &str) -> anyhow::Result<()> {
         match name.split_once("_ticks") {
             Some((what, which)) => {
                 let instructions = number * INSTRUCTIONS / TICKS;
-                println!("{what}_instructions{which}: {instructions}");
-                println!("{what}_ms_at_16_mhz{which}: {}", instructions.div_ceil(CLOCK_KHZ));
+                outln!("{what}_instructions{which}: {instructions}")?;
+                outln!("{what}_ms_at_16_mhz{which}: {}", instructions.div_ceil(CLOCK_KHZ))?;
             }
             None => {
-                println!("{name}: {number}");
+                outln!("{name}: {number}")?;
                 used_bytes += if name.ends_with("_bytes") { number } else { 0 };
             }
         }
     }
-    println!("ram_bytes: {used_bytes}");
+    outln!("ram_bytes: {used_bytes}")?;
     ensure!(used_bytes > 0 && used_bytes + STACK_RESERVE_BYTES < RAM_BYTES, "the stack may have grown into the robot");
     Ok(())
 }

@@ -1,11 +1,13 @@
 //! `toposlam export`: a robot's map as GraphML, DOT, GeoJSON, JSON, SVG, or a snapshot to localise on.
 
+use std::ffi::{OsStr, OsString};
 use std::fs::File;
-use std::io::{self, Read, Write};
+use std::io::{self, Read};
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, ensure};
 use clap::{Args, ValueEnum};
+use toposlam_cli::{errln, output};
 use toposlam_link::client::Client;
 use toposlam_link::export;
 use toposlam_link::import;
@@ -21,13 +23,16 @@ use toposlam_link::topology::TopologicalMap;
 pub(crate) struct Arguments {
     /// Source of the map: serial port of a robot, tcp:HOST:PORT, recording (FILE.mcap, feature `recording`), JSON of this command or a
     /// snapshot, file with the bytes of a line, or - for such bytes on the standard input.
-    source: String,
+    source: OsString,
     /// Output format.
     #[arg(long)]
     format: Format,
     /// File to write [default: the standard output].
     #[arg(long, value_name = "FILE")]
     output: Option<PathBuf>,
+    /// Replace an existing file.
+    #[arg(long)]
+    force: bool,
     /// Baud rate of a serial port.
     #[arg(long, default_value_t = 115_200)]
     baud: u32,
@@ -69,29 +74,39 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
         Format::Geojson => export::geojson(&map, &layout, here, arguments.edge_m, arguments.frame_mm),
         Format::Json => export::json(&map, &layout, here),
         Format::Svg => export::svg(&map, &layout, here),
-        Format::Snapshot => return write(arguments.output.as_deref(), &import::known_map(&map)?),
+        Format::Snapshot => return write(arguments, &import::known_map(&map)?),
     };
-    write(arguments.output.as_deref(), text.as_bytes())
+    write(arguments, text.as_bytes())
 }
 
-fn write(file: Option<&Path>, bytes: &[u8]) -> anyhow::Result<()> {
-    match file {
-        Some(file) => std::fs::write(file, bytes).with_context(|| format!("writing {}", file.display())),
-        None => Ok(io::stdout().write_all(bytes)?),
+fn write(arguments: &Arguments, bytes: &[u8]) -> anyhow::Result<()> {
+    match &arguments.output {
+        Some(file) => output::write_file(file, bytes, arguments.force),
+        None => Ok(output::write_bytes(bytes)?),
+    }
+}
+
+/// Warns of what makes the map doubtful.
+fn complain(listener: &Listener) {
+    let understanding = listener.understanding();
+    if !matches!(understanding, Understanding::Whole | Understanding::Unknown) {
+        errln!("{understanding}");
+    }
+    match listener.counters().restarts {
+        0 => {}
+        restarts => errln!("{restarts} restarts of the robot; the map is that of the last start"),
     }
 }
 
 /// The map of a source, and the vertex of the robot if it is known.
-pub(crate) fn read(source: &str, baud: u32) -> anyhow::Result<(TopologicalMap, Option<u8>)> {
-    if let Some(map) = map_file(Path::new(source)).with_context(|| format!("reading {source}"))? {
+pub(crate) fn read(source: &OsStr, baud: u32) -> anyhow::Result<(TopologicalMap, Option<u8>)> {
+    if let Some(map) = map_file(Path::new(source)).with_context(|| format!("reading {}", source.display()))? {
         return Ok((map, None));
     }
     let listener = listen(source, baud)?;
-    if let understanding @ (Understanding::Not(_) | Understanding::Partly { .. }) = listener.understanding() {
-        eprintln!("{understanding}");
-    }
+    complain(&listener);
     let map = listener.map();
-    ensure!(!map.vertices.is_empty(), "{source}: no map received");
+    ensure!(!map.vertices.is_empty(), "{}: no map received", source.display());
     Ok((map, listener.replica().location().map(|location| location.vertex)))
 }
 
@@ -108,19 +123,20 @@ fn map_file(path: &Path) -> anyhow::Result<Option<TopologicalMap>> {
 }
 
 /// Reads the map of a source; returns the listener that holds it.
-fn listen(source: &str, baud: u32) -> anyhow::Result<Listener> {
+fn listen(source: &OsStr, baud: u32) -> anyhow::Result<Listener> {
     if source == "-" {
         return recorded(io::stdin().lock()).context("reading the standard input");
     }
     let path = Path::new(source);
     if path.extension().is_some_and(|extension| extension == "mcap") {
-        return replayed(path).with_context(|| format!("reading {source}"));
+        return replayed(path).with_context(|| format!("reading {}", path.display()));
     }
     if path.is_file() {
-        let file = File::open(source).with_context(|| format!("opening {source}"))?;
-        return recorded(file).with_context(|| format!("reading {source}"));
+        let file = File::open(source).with_context(|| format!("opening {}", path.display()))?;
+        return recorded(file).with_context(|| format!("reading {}", path.display()));
     }
-    let line = line::open(source, baud)?;
+    let name = source.to_str().with_context(|| format!("{}: no such file", path.display()))?;
+    let line = line::open(name, baud)?;
     let mut client = Client::new(line, rand::random(), |_: &Listener, _: Event<'_>| {});
     client.map()?;
     Ok(client.listener().clone())
@@ -160,6 +176,6 @@ fn replayed(_: &Path) -> anyhow::Result<Listener> {
 
 fn complain_of_gaps(listener: &Listener) {
     if !listener.replica().is_complete() || !listener.replica().is_converged() {
-        eprintln!("the map is incomplete: vertices or edges may be missing");
+        errln!("the map is incomplete: vertices or edges may be missing");
     }
 }

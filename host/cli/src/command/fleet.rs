@@ -7,8 +7,9 @@ use std::time::{Duration, Instant};
 
 use anyhow::{Context, ensure};
 use clap::Args;
-use toposlam_cli::fleet::cost::{allow_many_connections, computing_time, resident_bytes};
+use toposlam_cli::fleet::cost::{allow_many_connections, computing_time, most_connections, resident_bytes};
 use toposlam_cli::fleet::{End, Fleet, Robot, Totals};
+use toposlam_cli::{errln, outln};
 
 use super::interrupt::Interrupt;
 use super::robots::pace;
@@ -18,6 +19,9 @@ const REPORT: Duration = Duration::from_secs(1);
 /// Maximum wait for connections before the first report.
 const CONNECTING: Duration = Duration::from_secs(5);
 
+/// Open files that are no connection.
+const OTHER_FILES: u64 = 32;
+
 /// Arguments of `toposlam fleet`.
 #[derive(Args)]
 pub(crate) struct Arguments {
@@ -25,7 +29,7 @@ pub(crate) struct Arguments {
     #[arg(required_unless_present = "simulate", conflicts_with = "simulate")]
     lines: Option<PathBuf>,
     /// Monitor this many recorded robots, which a child process serves.
-    #[arg(long, value_name = "ROBOTS")]
+    #[arg(long, value_name = "ROBOTS", value_parser = clap::value_parser!(u32).range(1..))]
     simulate: Option<u32>,
     /// Stop after this many seconds [default: at Ctrl-C, or when no robot is connected any more].
     #[arg(long)]
@@ -37,6 +41,9 @@ pub(crate) struct Arguments {
 
 pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     allow_many_connections().context("opening many connections")?;
+    if let Some(robots) = arguments.simulate {
+        check_connections(robots)?;
+    }
     let (lines, _robots) = match (&arguments.lines, arguments.simulate) {
         (None, Some(count)) => {
             let (robots, address) = Robots::start(count, arguments.speed)?;
@@ -70,7 +77,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
             fleet.listen(left, |_, _, _| ())?;
         }
         let sample = Sample::take(Instant::now(), &fleet);
-        println!("{}", sample.since(&last));
+        outln!("{}", sample.since(&last))?;
         last = sample;
         let is_over = end.is_some_and(|end| last.at - start.at >= end);
         if is_over || interrupt.is_told() || last.totals.connected + last.totals.connecting == 0 {
@@ -79,17 +86,28 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     }
     for robot in fleet.robots() {
         match robot.end() {
-            Some(End::Closed) => eprintln!("{} closed its line", robot.name()),
-            Some(End::Failed(reason)) => eprintln!("{} failed: {reason}", robot.name()),
+            Some(End::Closed) => errln!("{} closed its line", robot.name()),
+            Some(End::Failed(reason)) => errln!("{} failed: {reason}", robot.name()),
             None => {}
         }
     }
-    println!("in all: {}", last.since(&start));
+    outln!("in all: {}", last.since(&start))?;
     let robots = fleet.robots().len().max(1) as u64;
-    println!("{} bytes a robot in this process's own books", size_of::<Robot>());
+    outln!("{} bytes a robot in this process's own books", size_of::<Robot>())?;
     if let (Some(before), Some(after)) = (resident_before, resident_bytes()) {
-        println!("{} bytes of memory in use a robot, {after} in all", after.saturating_sub(before) / robots);
+        outln!("{} bytes of memory in use a robot, {after} in all", after.saturating_sub(before) / robots)?;
     }
+    Ok(())
+}
+
+/// Fails if this process may not open a connection for each robot. The process of the robots has the same limit.
+fn check_connections(robots: u32) -> anyhow::Result<()> {
+    let Some(most) = most_connections() else { return Ok(()) };
+    let most = most.saturating_sub(OTHER_FILES);
+    ensure!(
+        u64::from(robots) <= most,
+        "--simulate {robots}: the operating system allows {most} connections for a process (`ulimit -Hn`) and local port"
+    );
     Ok(())
 }
 
@@ -128,7 +146,11 @@ impl Sample {
             let computing = (now - then).as_secs_f64();
             text += &format!("; {:.1} % of a core, on a whole one {}", computing / seconds * 100.0, rates(computing));
         }
-        text + &format!("; {} frames lost, {} damaged", now.lost - then.lost, now.damaged - then.damaged)
+        text += &format!("; {} frames lost, {} damaged", now.lost - then.lost, now.damaged - then.damaged);
+        if now.unknown > then.unknown {
+            text += &format!(", {} unknown", now.unknown - then.unknown);
+        }
+        text
     }
 }
 

@@ -18,6 +18,7 @@ use toposlam::ring::RingFrame;
 use toposlam::wire::{Command, Encoder, MAX_FRAME_BYTES, Message, Outcome, Reply, Request};
 use toposlam::{FaultCounters, FaultKind, Fingerprint};
 use toposlam_cli::emulator::Emulation;
+use toposlam_cli::outln;
 use toposlam_cli::progress::Progress;
 use toposlam_sim::exploration::Exploration;
 use toposlam_sim::injector::{FaultRates, LineInjector};
@@ -145,20 +146,20 @@ pub(super) fn run(
     let faults = FaultCounters::new();
     arguments.summarise(&Summary { faults, ..Summary::of(&plan, &exploration) })?;
     for kind in FaultKind::ALL.into_iter().filter(|kind| heard.replica.fault(*kind) > 0) {
-        println!("firmware's fault {kind:?}: {}", heard.replica.fault(kind));
+        outln!("firmware's fault {kind:?}: {}", heard.replica.fault(kind))?;
     }
-    println!("sensor bus: {}", outcome.bridge);
-    println!("line to the firmware: {}", line.counts());
-    println!(
+    outln!("sensor bus: {}", outcome.bridge)?;
+    outln!("line to the firmware: {}", line.counts())?;
+    outln!(
         "firmware: {} places in {} frames, {turns} rounds of the loop, {:.1} s",
         exploration.places(),
         outcome.frames,
         outcome.seconds
-    );
+    )?;
     if let Some(bytes) = outcome.stack_high_water_bytes {
-        println!("stack_high_water_bytes: {bytes}");
+        outln!("stack_high_water_bytes: {bytes}")?;
     }
-    println!("the firmware went on in spite of every fault, and lost no place");
+    outln!("the firmware went on in spite of every fault, and lost no place")?;
     Ok(())
 }
 

@@ -1,10 +1,10 @@
 //! `toposlam merge`: one map of the maps of two robots or two runs in one building.
 
-use std::io::{self, Write};
+use std::ffi::OsString;
 use std::path::PathBuf;
 
-use anyhow::Context;
 use clap::Args;
+use toposlam_cli::{errln, output};
 use toposlam_link::export;
 use toposlam_link::layout::Layout;
 use toposlam_link::merge::merge;
@@ -15,12 +15,15 @@ use super::export::read;
 #[derive(Args)]
 pub(crate) struct Arguments {
     /// Source of the first map, as of `export`: line of a robot, recording, JSON of `export`, snapshot. Its vertices keep their numbers.
-    first: String,
+    first: OsString,
     /// Source of the second map.
-    second: String,
+    second: OsString,
     /// File for the merged map in the JSON of `export` [default: the standard output].
     #[arg(long, value_name = "FILE")]
     output: Option<PathBuf>,
+    /// Replace an existing file.
+    #[arg(long)]
+    force: bool,
     /// Baud rate of a serial port.
     #[arg(long, default_value_t = 115_200)]
     baud: u32,
@@ -31,17 +34,17 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     let (second, _) = read(&arguments.second, arguments.baud)?;
     let merged = merge(&first, &second)?;
     for part in &merged.parts {
-        eprintln!("common part: {part}");
+        errln!("common part: {part}");
     }
     let pairs: Vec<String> = merged.common.iter().map(|(a, b)| format!("{a}={b}")).collect();
-    eprintln!("common vertices, first = second: {}", pairs.join(" "));
+    errln!("common vertices, first = second: {}", pairs.join(" "));
     let sizes = [&first, &second, &merged.map].map(|map| map.vertices.len());
-    eprintln!("vertices: {} and {}, merged {}", sizes[0], sizes[1], sizes[2]);
+    errln!("vertices: {} and {}, merged {}", sizes[0], sizes[1], sizes[2]);
     let mut layout = Layout::new();
     layout.arrange(&merged.map);
     let text = export::json(&merged.map, &layout, here);
     match &arguments.output {
-        Some(file) => std::fs::write(file, text).with_context(|| format!("writing {}", file.display())),
-        None => Ok(io::stdout().write_all(text.as_bytes())?),
+        Some(file) => output::write_file(file, text, arguments.force),
+        None => Ok(output::write_bytes(text.as_bytes())?),
     }
 }

@@ -5,17 +5,20 @@ macro_rules! missing {
         pub(crate) mod $command {
             /// Whatever follows the command.
             #[derive(clap::Args)]
+            // The help of the omitted command is an error, too, which says how to get the command.
+            #[command(disable_help_flag = true)]
             pub(crate) struct Arguments {
                 #[arg(trailing_var_arg = true, allow_hyphen_values = true, hide = true)]
-                rest: Vec<String>,
+                rest: Vec<std::ffi::OsString>,
             }
 
             pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
-                let command = [&[stringify!($command).to_owned()], &arguments.rest[..]].concat().join(" ");
+                let command = [&[stringify!($command).into()], &arguments.rest[..]].concat().join(" ".as_ref());
                 anyhow::bail!(
                     "this build leaves out `{}`; run\n  cargo run --release --features {} -- {command}",
                     stringify!($command),
                     $feature,
+                    command = command.display(),
                 )
             }
         }

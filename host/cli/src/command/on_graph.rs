@@ -65,7 +65,7 @@ fn map<const V: usize>(
             mapping.observe(&frame, if options.hints == Hints::Turn { truth.passage() } else { Passage::UNKNOWN })
         {
             ground_truth.detect(&step.place);
-            progress.println(step);
+            progress.println(step)?;
             progress.increment();
         }
     }

@@ -6,6 +6,7 @@ use anyhow::Context;
 use clap::Args;
 use toposlam::reference::VERTICES;
 use toposlam_cli::picture::{Drawing, draw};
+use toposlam_cli::{outln, output};
 use toposlam_sim::world::{Limits, Plan, Point, TrueMap};
 
 use super::drive::{load_plan, start};
@@ -14,13 +15,16 @@ use super::drive::{load_plan, start};
 #[derive(Args)]
 pub(crate) struct Arguments {
     /// Floor plan: the name of a built-in plan, or a file (docs/plans.md).
-    plan: String,
+    plan: PathBuf,
     /// Start of the robot, in metres in the frame of the plan [default: the start of the plan, or its most open place].
     #[arg(long, value_name = "X,Y", value_parser = start, allow_hyphen_values = true)]
     start: Option<(f64, f64)>,
     /// Write the walls and the true map to an SVG file.
     #[arg(long, value_name = "FILE")]
     svg: Option<PathBuf>,
+    /// Replace an existing file.
+    #[arg(long)]
+    force: bool,
     /// Half the width of the robot, in millimetres, 1 to 1000000.
     #[arg(long, value_name = "MM", default_value_t = Limits::default().body_radius_mm, value_parser = millimetres)]
     body_radius_mm: f64,
@@ -37,39 +41,42 @@ fn millimetres(text: &str) -> Result<f64, String> {
 }
 
 pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
-    let name = &arguments.plan;
-    let plan = load_plan(name, arguments.start)?;
+    let name = arguments.plan.display();
+    if let Some(file) = &arguments.svg {
+        output::check(file, arguments.force)?;
+    }
+    let plan = load_plan(&arguments.plan, arguments.start)?;
     let limits =
         Limits { body_radius_mm: arguments.body_radius_mm, range_max_mm: arguments.range_max_mm, ..Limits::default() };
     let truth = plan.true_map(&limits);
     let (x_m, y_m) = plan.in_file_m(plan.start());
-    println!(
+    outln!(
         "{name}: {:.2} m by {:.2} m, {} wall surfaces, start {x_m:.2},{y_m:.2}",
         plan.width_mm() / 1000.0,
         plan.height_mm() / 1000.0,
         plan.surfaces()
-    );
+    )?;
     if !plan.fits(plan.start(), limits.body_radius_mm) {
-        println!("warning: the body does not fit at the start");
+        outln!("warning: the body does not fit at the start")?;
     }
     let truth = truth.with_context(|| format!("floor plan {name}"))?;
-    list(&plan, &truth);
-    warn(&truth, &limits);
+    list(&plan, &truth)?;
+    warn(&truth, &limits)?;
     let Some(file) = &arguments.svg else { return Ok(()) };
     let mut drawing =
         Drawing::of_truth(&truth, format!("{name}: {} places, {} edges", truth.nodes.len(), truth.edges.len()));
     // The ways are drawn as they are.
     drawing.edges.clear();
-    std::fs::write(file, draw(&plan, &truth, &drawing)).with_context(|| format!("writing {}", file.display()))
+    output::write_file(file, draw(&plan, &truth, &drawing), arguments.force)
 }
 
 /// Prints the places, the edges, what was dropped, and the parts that cannot be reached.
-fn list(plan: &Plan, truth: &TrueMap) {
+fn list(plan: &Plan, truth: &TrueMap) -> anyhow::Result<()> {
     let place = |point: Point| {
         let (x_m, y_m) = plan.in_file_m(point);
         format!("{x_m:8.2},{y_m:.2}")
     };
-    println!("{} places, {} edges", truth.nodes.len(), truth.edges.len());
+    outln!("{} places, {} edges", truth.nodes.len(), truth.edges.len())?;
     for (index, node) in truth.nodes.iter().enumerate() {
         let hall = if node.is_hall { ", a hall" } else { "" };
         let merged = match node.meet_points.len() {
@@ -77,40 +84,47 @@ fn list(plan: &Plan, truth: &TrueMap) {
             count => format!(", {count} meet points"),
         };
         let (radius_mm, degree) = (node.radius_mm, node.degree);
-        println!(
+        outln!(
             "place {index:3} at {:16} radius {radius_mm:5.0} mm, degree {degree}{merged}{hall}",
             place(node.position)
-        );
+        )?;
     }
     for edge in &truth.edges {
         let length_mm: f64 = edge.way.windows(2).map(|ends| ends[0].distance_mm(ends[1])).sum();
-        println!("edge {:3} - {:3}, {:.2} m", edge.nodes[0], edge.nodes[1], length_mm / 1000.0);
+        outln!("edge {:3} - {:3}, {:.2} m", edge.nodes[0], edge.nodes[1], length_mm / 1000.0)?;
     }
     let dropped = &truth.dropped;
-    println!(
+    outln!(
         "meet points that are no places: {} too narrow, {} unreachable, {} on branches to nothing, {} smooth, {} merged, {} in halls",
-        dropped.narrow, dropped.unreachable, dropped.branches, dropped.smooth, dropped.merged, dropped.halls
-    );
+        dropped.narrow,
+        dropped.unreachable,
+        dropped.branches,
+        dropped.smooth,
+        dropped.merged,
+        dropped.halls
+    )?;
     for part in &truth.unreachable {
         let (count, radius_mm) = (part.meet_points, part.radius_mm);
-        println!(
+        outln!(
             "unreachable: {count} meet points around {}, radius {radius_mm:.0} mm",
             place(part.position).trim_start()
-        );
+        )?;
     }
+    Ok(())
 }
 
 /// Prints what the reference robot cannot cope with.
-fn warn(truth: &TrueMap, limits: &Limits) {
+fn warn(truth: &TrueMap, limits: &Limits) -> anyhow::Result<()> {
     if truth.nodes.len() > VERTICES {
-        println!("warning: {} places, and the map of the reference robot has room for {VERTICES}", truth.nodes.len());
+        outln!("warning: {} places, and the map of the reference robot has room for {VERTICES}", truth.nodes.len())?;
     }
     for (index, node) in truth.nodes.iter().enumerate() {
         if node.is_hall {
-            println!(
+            outln!(
                 "warning: place {index} is farther from its walls than the sonars measure ({:.0} mm)",
                 limits.range_max_mm
-            );
+            )?;
         }
     }
+    Ok(())
 }

@@ -6,6 +6,7 @@ use std::time::{Duration, Instant};
 
 use clap::Args;
 use toposlam_cli::publish::{Broker, BrokerEvent, Options, Publisher};
+use toposlam_cli::{errln, outln};
 use toposlam_link::link::{Link, LinkEvent, Options as LinkOptions, Source};
 
 use super::interrupt::Interrupt;
@@ -39,8 +40,8 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     let mut options = Options::new(arguments.broker.clone(), &arguments.robot)?;
     options.frames = arguments.frames;
     let publisher = Publisher::start(options, |event| match event {
-        BrokerEvent::Connected => eprintln!("the broker is connected"),
-        BrokerEvent::Disconnected(reason) => eprintln!("the broker is away: {reason}"),
+        BrokerEvent::Connected => errln!("the broker is connected"),
+        BrokerEvent::Disconnected(reason) => errln!("the broker is away: {reason}"),
     });
     let publisher = Arc::new(Mutex::new(Some(publisher)));
     let interrupt = Interrupt::watch()?;
@@ -49,8 +50,8 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     let source = Source::named(&arguments.line, arguments.baud);
     let link = Link::start(source, LinkOptions::default(), move |event| {
         match &event {
-            LinkEvent::Connected => eprintln!("the robot is connected"),
-            LinkEvent::Disconnected(reason) => eprintln!("the robot is away: {reason}"),
+            LinkEvent::Connected => errln!("the robot is connected"),
+            LinkEvent::Disconnected(reason) => errln!("the robot is away: {reason}"),
             _ => {}
         }
         let mut publisher = teller.lock().unwrap_or_else(PoisonError::into_inner);
@@ -67,6 +68,6 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     let Some(publisher) = publisher.lock().unwrap_or_else(PoisonError::into_inner).take() else { return Ok(()) };
     let counters = publisher.counters();
     drop(publisher);
-    println!("{} published, {} dropped", counters.published, counters.dropped);
+    outln!("{} published, {} dropped", counters.published, counters.dropped)?;
     Ok(())
 }

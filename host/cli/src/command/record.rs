@@ -7,6 +7,7 @@ use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 
 use anyhow::Context;
 use clap::Args;
+use toposlam_cli::outln;
 use toposlam_link::line::{Line, open};
 use toposlam_link::recording::{Recorder, RecordingError, Ros2Bag, Summary};
 
@@ -103,14 +104,14 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
         }
     }
     let summary = recorder.finish()?;
-    println!(
+    outln!(
         "{}: {} frames of {} bytes in {:.1} s, {} places",
         file.display(),
         summary.frames,
         summary.bytes,
         start.elapsed().as_secs_f64(),
         summary.places
-    );
+    )?;
     match lost {
         Some(error) if error.kind() != ErrorKind::UnexpectedEof => Err(error).context("the line to the robot failed"),
         _ => Ok(()),

@@ -7,6 +7,7 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context, ensure};
 use clap::Args;
 use toposlam::{Map, Passage, reference};
+use toposlam_cli::outln;
 use toposlam_eval::faults::fault_lines;
 use toposlam_eval::graph::Graph;
 use toposlam_eval::gvg_adherence::GvgAdherence;
@@ -51,17 +52,17 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     let mut mapping = Mapping::of_recording(&ring, arguments.filter.for_recording()?)?;
     for frame in &frames {
         if let Some(step) = mapping.observe(frame, Passage::UNKNOWN) {
-            println!("{step}");
+            outln!("{step}")?;
         }
     }
-    println!("\n{} frames, {} places", frames.len(), mapping.steps().len());
+    outln!("\n{} frames, {} places", frames.len(), mapping.steps().len())?;
     for (column, blanks) in ring.columns.iter().zip(blanks).filter(|(_, blanks)| *blanks > 0) {
-        println!("sonar {column}: no range in {blanks} of {} frames; there it is a dead sonar", frames.len());
+        outln!("sonar {column}: no range in {blanks} of {} frames; there it is a dead sonar", frames.len())?;
     }
-    println!("{}", GvgAdherence::of(&frames, &ring.geometry(), &reference::PLACE));
+    outln!("{}", GvgAdherence::of(&frames, &ring.geometry(), &reference::PLACE))?;
     let path = mapping.path();
     let vertices: Vec<String> = path.iter().map(|vertex| Named(*vertex).to_string()).collect();
-    println!("by the final map the places were: {}", vertices.join(" "));
+    outln!("by the final map the places were: {}", vertices.join(" "))?;
     let places = mapping.steps().iter().map(|step| step.place);
     let visits = places.zip(path).map(|(place, vertex)| Visit {
         frame: place.frame_index,
@@ -70,14 +71,14 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     });
     let visits: Vec<Visit> = visits.collect();
     if arguments.poses.is_some() {
-        println!("{}", Revisits::of(&visits, &poses));
+        outln!("{}", Revisits::of(&visits, &poses))?;
     }
     if let Some(lap_frames) = arguments.lap_frames {
-        println!("\n{}\n", Laps::compare(&visits, lap_frames, frames.len() as u32, Tolerance::of(lap_frames)));
+        outln!("\n{}\n", Laps::compare(&visits, lap_frames, frames.len() as u32, Tolerance::of(lap_frames)))?;
     }
-    print_map(mapping.map(), mapping.steps().last().is_some_and(|step| step.is_uncertain));
+    print_map(mapping.map(), mapping.steps().last().is_some_and(|step| step.is_uncertain))?;
     for line in fault_lines(&mapping.faults()) {
-        println!("fault {line}");
+        outln!("fault {line}")?;
     }
     Ok(())
 }
@@ -107,15 +108,16 @@ fn load_robot_recording(_: &Path, _: Option<Ring>) -> anyhow::Result<(Ring, Reco
     Err(super::missing::no_recordings())
 }
 
-fn print_map<const V: usize>(map: &Map<V>, is_uncertain: bool) {
+fn print_map<const V: usize>(map: &Map<V>, is_uncertain: bool) -> anyhow::Result<()> {
     let edges: Vec<_> = map.edges().collect();
     let uncertain = if is_uncertain { ", uncertain" } else { "" };
-    println!("map: {} vertices, {} edges{uncertain}", map.vertices().len(), edges.len());
+    outln!("map: {} vertices, {} edges{uncertain}", map.vertices().len(), edges.len())?;
     for (vertex, label) in map.vertices().zip(map.labels()) {
-        println!("  vertex {vertex:2}: radius {:4} mm, {} visits", label.radius_mm(), map.visits(vertex));
+        outln!("  vertex {vertex:2}: radius {:4} mm, {} visits", label.radius_mm(), map.visits(vertex))?;
     }
     let texts: Vec<String> = edges.iter().map(|(a, b)| format!("{a}-{b}")).collect();
-    println!("  edges: {}", texts.join(" "));
+    outln!("  edges: {}", texts.join(" "))?;
     let graph = Graph::from_edges(map.vertices().len(), edges.iter().map(|&(a, b)| (a.into(), b.into())));
-    println!("  the map is {}", Shape::of(&graph));
+    outln!("  the map is {}", Shape::of(&graph))?;
+    Ok(())
 }

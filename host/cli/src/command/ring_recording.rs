@@ -5,6 +5,7 @@ use std::path::Path;
 use anyhow::{Context, bail, ensure};
 use toposlam::ring::{Echo, RingFrame};
 use toposlam::wire::{Echoes, Message};
+use toposlam_cli::errln;
 use toposlam_eval::range_csv::{Recorded, Ring, SONARS_MAX};
 use toposlam_link::listener::{Event, Listener};
 use toposlam_link::recording::Recording;
@@ -21,7 +22,7 @@ pub(super) fn load(path: &Path, ring: Option<Ring>) -> anyhow::Result<(Ring, Rec
         });
     }
     if rings.missing > 0 {
-        eprintln!("{} of {} ring frames are missing in the recording", rings.missing, rings.missing + rings.count());
+        errln!("{} of {} ring frames are missing in the recording", rings.missing, rings.missing + rings.count());
     }
     let sonars = rings.recorded.blanks.len();
     ensure!(sonars > 0, "no ring frames: the robot does not send them");

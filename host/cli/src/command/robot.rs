@@ -1,10 +1,12 @@
 //! `toposlam robot`: a simulated robot that serves its line at a TCP port, for use without hardware.
 
+use std::path::PathBuf;
 use std::time::{Duration, Instant};
 
 use anyhow::Context;
 use clap::Args;
-use toposlam::reference::SNAPSHOT_BYTES;
+use toposlam::reference::{ROBOT, SNAPSHOT_BYTES};
+use toposlam_cli::outln;
 use toposlam_link::broadcast::Broadcast;
 use toposlam_sim::exploration::Exploration;
 use toposlam_sim::world::RobotModel;
@@ -22,7 +24,7 @@ pub(crate) struct Arguments {
     listen: String,
     /// Floor plan: the name of a built-in plan, or a file (docs/plans.md).
     #[arg(long, default_value = "office")]
-    plan: String,
+    plan: PathBuf,
     /// Start of the robot, in metres in the frame of the plan [default: the start of the plan, or its most open place].
     #[arg(long, value_name = "X,Y", value_parser = start, allow_hyphen_values = true)]
     start: Option<(f64, f64)>,
@@ -50,10 +52,11 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     let plan = load_plan(&arguments.plan, arguments.start)?;
     let mut buffer = [0; SNAPSHOT_BYTES];
     let model = RobotModel::default().with_noise(arguments.noise);
-    let mut exploration = Exploration::start(&plan, model, arguments.seed, &mut buffer)?;
+    let config = ROBOT.with_session(rand::random::<u32>().max(1));
+    let mut exploration: Exploration<'_> = Exploration::with_robot(&plan, model, arguments.seed, &config, &mut buffer)?;
     let mut broadcast =
         Broadcast::bind(&arguments.listen).with_context(|| format!("listening at {}", arguments.listen))?;
-    println!("a simulated robot listens at tcp:{}", broadcast.address()?);
+    outln!("a simulated robot listens at tcp:{}", broadcast.address()?)?;
     let frame_time = Duration::from_secs_f64(1.0 / (FRAMES_PER_SECOND * arguments.speed));
     let mut next_frame = Instant::now();
     while arguments.places == 0 || exploration.places() < arguments.places {

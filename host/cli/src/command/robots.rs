@@ -1,11 +1,13 @@
 //! `toposlam robots`: serve many recorded robots at one TCP port, for `toposlam fleet --simulate`.
 
+use std::path::Path;
 use std::time::{Duration, Instant};
 
 use anyhow::Context;
 use clap::Args;
 use toposlam_cli::fleet::cost::allow_many_connections;
 use toposlam_cli::fleet::replay_server::{AtEnd, Pace, RecordedStream, ReplayServer};
+use toposlam_cli::{errln, outln};
 
 use super::drive::load_plan;
 
@@ -40,14 +42,14 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     allow_many_connections().context("opening many connections")?;
     let mut streams = Vec::new();
     for (plan, seed) in LIVES {
-        let recorded = RecordedStream::record(&load_plan(plan, None)?, seed, arguments.frames as usize)?;
-        eprintln!("recorded {plan}: {} ring frames, {} bytes", recorded.frames(), recorded.bytes());
+        let recorded = RecordedStream::record(&load_plan(Path::new(plan), None)?, seed, arguments.frames as usize)?;
+        errln!("recorded {plan}: {} ring frames, {} bytes", recorded.frames(), recorded.bytes());
         streams.push(recorded);
     }
     let pace = if arguments.speed == 0.0 { Pace::Unbounded } else { Pace::Times(arguments.speed) };
     let mut server = ReplayServer::bind(&arguments.listen, streams, arguments.count as usize, AtEnd::Restart)
         .with_context(|| format!("listening at {}", arguments.listen))?;
-    println!("{} robots listen at tcp:{}", arguments.count, server.address()?);
+    outln!("{} robots listen at tcp:{}", arguments.count, server.address()?)?;
     let mut lived = Instant::now();
     while server.accepted() == 0 || server.connected() > 0 {
         let time = lived.elapsed();

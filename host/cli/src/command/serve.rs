@@ -5,6 +5,7 @@ use clap::Args;
 use toposlam_cli::serve::follow;
 use toposlam_cli::serve::server::{Options, Server};
 use toposlam_cli::serve::state::State;
+use toposlam_cli::{errln, outln};
 use toposlam_link::link;
 use toposlam_link::watch::Watch;
 
@@ -31,15 +32,15 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
         .with_context(|| format!("serving at {listen}"))?;
     let address = server.address();
     if !address.ip().to_canonical().is_loopback() {
-        eprintln!("warning: whoever reaches {address} sees the robot's map: there is no password and no encryption");
+        errln!("warning: whoever reaches {address} sees the robot's map: there is no password and no encryption");
     }
     if address.ip().is_unspecified() {
-        println!("the map is at http://localhost:{}/", address.port());
+        outln!("the map is at http://localhost:{}/", address.port())?;
     } else {
-        println!("the map is at http://{address}/");
+        outln!("the map is at http://{address}/")?;
     }
     follow(line, *baud, link::Options::default(), &server);
-    eprintln!("the input has ended; the page stays until this program is stopped");
+    errln!("the input has ended; the page stays until this program is stopped");
     loop {
         std::thread::park();
     }

@@ -1,14 +1,15 @@
 //! `toposlam simulate`: a simulated robot explores a floor plan with its own drive.
 
+use std::fmt::Display;
 use std::path::PathBuf;
 
-use anyhow::Context;
 use clap::Args;
 use toposlam::Filter;
 use toposlam::persist::Persist;
 use toposlam::wire::FilterSettings;
 use toposlam_cli::picture::{Drawing, Step, animate};
 use toposlam_cli::progress::Progress;
+use toposlam_cli::{outln, output};
 use toposlam_sim::exploration::Exploration;
 use toposlam_sim::hardware::Hardware;
 use toposlam_sim::world::{Detection, Plan, RobotModel};
@@ -43,6 +44,7 @@ pub(crate) struct Arguments {
 
 pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     let Arguments { drive, places, frames, filter, on_graph, .. } = arguments;
+    drive.check_files(&[&arguments.animate])?;
     if on_graph.on_graph {
         return on_graph::run(drive, on_graph, *filter, *places, *frames);
     }
@@ -76,7 +78,7 @@ where
         while exploration.places() < *places && (*frames == 0 || exploration.frames() < *frames) {
             exploration.advance();
         }
-        println!("the reference robot: {}", Summary::of(plan, &exploration).against_truth());
+        outln!("the reference robot: {}", Summary::of(plan, &exploration).against_truth())?;
         return Ok(());
     }
     let progress = Progress::new("", *places, "places");
@@ -85,7 +87,7 @@ where
         if exploration.advance().is_some()
             && let Some(step) = exploration.steps().last()
         {
-            progress.println(step);
+            progress.println(step)?;
             progress.increment();
             if animation.is_some() {
                 steps.push(map_now(drive.plan(), &exploration, way.len()));
@@ -99,14 +101,18 @@ where
     drive.summarise(&Summary::of(plan, &exploration))?;
     if let Some(file) = animation {
         let picture = animate(plan, &way, &steps);
-        std::fs::write(file, picture).with_context(|| format!("writing {}", file.display()))?;
+        output::write_file(file, picture, arguments.drive.force())?;
     }
-    println!("{} ring frames, stopped by a wall in {}", exploration.frames(), exploration.rover().bumps());
+    outln!("{} ring frames, stopped by a wall in {}", exploration.frames(), exploration.rover().bumps())?;
     Ok(())
 }
 
 /// The current map, with each vertex at the true node of the majority of its visits.
-fn map_now<const V: usize, F, const S: usize>(plan: &str, exploration: &Exploration<'_, V, F, S>, driven: usize) -> Step
+fn map_now<const V: usize, F, const S: usize>(
+    plan: impl Display,
+    exploration: &Exploration<'_, V, F, S>,
+    driven: usize,
+) -> Step
 where
     F: Filter<V, Config: FilterSettings> + Persist,
 {

@@ -2,6 +2,8 @@
 
 use anyhow::ensure;
 use clap::Args;
+use std::path::PathBuf;
+use toposlam_cli::outln;
 use toposlam_eval::soak::{Soak, TURNS_PER_HOUR};
 use toposlam_sim::injector::FaultRates;
 use toposlam_sim::world::RobotModel;
@@ -13,7 +15,7 @@ use super::drive::{fault_rate, load_plan, noise_factor, start};
 pub(crate) struct Arguments {
     /// Floor plan: the name of a built-in plan, or a file (docs/plans.md).
     #[arg(long, default_value = "office")]
-    plan: String,
+    plan: PathBuf,
     /// Start of the robot, in metres in the frame of the plan [default: the start of the plan, or its most open place].
     #[arg(long, value_name = "X,Y", value_parser = start, allow_hyphen_values = true)]
     start: Option<(f64, f64)>,
@@ -38,10 +40,10 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     let soak = Soak { model, rates, seed: arguments.seed, turns: arguments.hours.saturating_mul(TURNS_PER_HOUR) };
     let life = soak.run(&load_plan(&arguments.plan, arguments.start)?)?;
     for line in life.lines() {
-        println!("{line}");
+        outln!("{line}")?;
     }
     let mistakes = life.mistakes();
     ensure!(mistakes.is_empty(), "{}", mistakes.join("; "));
-    println!("no place was lost, and every injected fault that can be counted was counted");
+    outln!("no place was lost, and every injected fault that can be counted was counted")?;
     Ok(())
 }

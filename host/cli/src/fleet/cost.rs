@@ -41,6 +41,22 @@ pub fn allow_many_connections() -> io::Result<()> {
     Ok(())
 }
 
+/// The most connections from this process to one port of this computer; `None` if it is not available. Each takes an open file
+/// and a local port.
+pub fn most_connections() -> Option<u64> {
+    #[cfg(unix)]
+    let files = rustix::process::getrlimit(rustix::process::Resource::Nofile).current;
+    #[cfg(not(unix))]
+    let files = None;
+    let range = std::fs::read_to_string("/proc/sys/net/ipv4/ip_local_port_range").ok();
+    let ports = range.and_then(|range| {
+        let mut ends = range.split_whitespace().map_while(|end| end.parse::<u64>().ok());
+        let (first, last) = (ends.next()?, ends.next()?);
+        Some(last.saturating_sub(first) + 1)
+    });
+    [files, ports].into_iter().flatten().min()
+}
+
 /// Sets the number of connections that may wait to be accepted. The system may drop any beyond it: with the usual 128,
 /// some of a thousand clients appear connected but receive nothing.
 pub(super) fn expect_many(port: &TcpListener, count: usize) -> io::Result<()> {

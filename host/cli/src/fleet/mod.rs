@@ -108,8 +108,10 @@ pub struct Totals {
     pub places: u64,
     /// Lost frames.
     pub lost: u64,
-    /// Frames that failed to decode: damaged, or of another release.
+    /// Damaged frames.
     pub damaged: u64,
+    /// Intact frames of another version, or with an unknown message.
+    pub unknown: u64,
 }
 
 impl Fleet {
@@ -210,11 +212,8 @@ impl Fleet {
             totals.bytes += robot.bytes;
             totals.places += robot.places;
             totals.lost += u64::from(counters.lost);
-            totals.damaged +=
-                [counters.corrupt, counters.cut, counters.too_long, counters.unknown_version, counters.unknown_message]
-                    .map(u64::from)
-                    .iter()
-                    .sum::<u64>();
+            totals.damaged += [counters.corrupt, counters.cut, counters.too_long].map(u64::from).iter().sum::<u64>();
+            totals.unknown += u64::from(counters.unknown_version) + u64::from(counters.unknown_message);
         }
         totals
     }

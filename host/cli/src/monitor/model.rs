@@ -11,7 +11,7 @@ use toposlam::wire::{Arrival, Command, Header, Info, Message, Outcome};
 
 use super::prompt::{Prompt, Question};
 use toposlam_link::event_text;
-use toposlam_link::link::{Answer, LinkEvent, Task, TaskError};
+use toposlam_link::link::{Answer, LinkEvent, TASKS, Task, TaskError};
 use toposlam_link::watch::Watch;
 
 const LOG_LINES: usize = 200;
@@ -137,7 +137,13 @@ impl Model {
 
     fn task_done(&mut self, task: &Task, answer: &Result<Answer, TaskError>) {
         match answer {
-            Ok(Answer::Outcome(Outcome::Refused(refusal))) => self.show_problem(format!("{task}: refused: {refusal}")),
+            Ok(Answer::Outcome(Outcome::Refused(refusal))) => {
+                let why = match task {
+                    Task::Command(command) => event_text::refusal(command, *refusal),
+                    _ => refusal.to_string(),
+                };
+                self.show_problem(format!("{task}: refused: {why}"));
+            }
             Ok(Answer::Outcome(outcome)) => {
                 self.note(format!("{task}: {}", event_text::outcome(outcome)));
                 match (task, outcome) {
@@ -151,7 +157,13 @@ impl Model {
                 }
             }
             Ok(Answer::Written(bytes)) => self.note(format!("{task}: {bytes} bytes written")),
-            Ok(Answer::Restored(bytes)) => self.note(format!("{task}: {bytes} bytes restored")),
+            Ok(Answer::Restored { bytes, changes }) => {
+                self.note(format!("{task}: {bytes} bytes restored"));
+                for change in changes.iter().flatten() {
+                    self.note(format!("the snapshot has changed: {change}"));
+                }
+                self.reported = Reported::default();
+            }
             Err(error) => self.show_problem(format!("{task}: {error}")),
         }
     }
@@ -220,7 +232,7 @@ impl Model {
             return None;
         }
         match wanted {
-            Ok(command) => Some(self.start(Task::Command(command))),
+            Ok(command) => self.start(Task::Command(command)),
             Err(question) => {
                 self.prompt = Some(Prompt::new(question));
                 None
@@ -234,7 +246,7 @@ impl Model {
             KeyCode::Backspace => self.prompt.as_mut()?.pop(),
             KeyCode::Esc => self.prompt = None,
             KeyCode::Enter => match self.prompt.take()?.answer() {
-                Ok(task) => return Some(self.start(task)),
+                Ok(task) => return self.start(task),
                 Err(why) => self.show_problem(why),
             },
             _ => {}
@@ -242,9 +254,14 @@ impl Model {
         None
     }
 
-    fn start(&mut self, task: Task) -> Action {
+    /// Refuses a task when the link has no room for it.
+    fn start(&mut self, task: Task) -> Option<Action> {
+        if self.waiting.len() >= TASKS {
+            self.show_problem(format!("{task}: {TASKS} requests are waiting already"));
+            return None;
+        }
         self.waiting.push_back(task.to_string());
-        Action::Start(task)
+        Some(Action::Start(task))
     }
 
     /// Arranges the map if it has changed, and updates the time of silence. Call it before drawing.

@@ -41,9 +41,9 @@ impl Prompt {
     pub(super) fn question(&self) -> String {
         match self.question {
             Question::GoTo => "go to which vertex? ".to_owned(),
-            Question::Snapshot => "snapshot to which file? ".to_owned(),
+            Question::Snapshot => "snapshot to which file [--force]? ".to_owned(),
             Question::Restore => "restore from which file? ".to_owned(),
-            Question::Setting => format!("set NAME VALUE ({}): ", setting::NAMES.join(", ")),
+            Question::Setting => "set NAME VALUE: ".to_owned(),
             Question::Reset => "forget the whole map? type yes: ".to_owned(),
         }
     }
@@ -63,12 +63,16 @@ impl Prompt {
                 let vertex = text.parse().map_err(|_| format!("`{text}` is no number of a vertex"))?;
                 Ok(Task::Command(Command::GoTo { vertex }))
             }
-            Question::Snapshot => Ok(Task::Snapshot(PathBuf::from(text))),
+            Question::Snapshot => {
+                let (file, force) = text.strip_suffix(" --force").map_or((text, false), |file| (file.trim_end(), true));
+                Ok(Task::Snapshot { file: PathBuf::from(file), force })
+            }
             Question::Restore => Ok(Task::Restore(PathBuf::from(text))),
             Question::Setting => {
                 let (name, value) = text.split_once(' ').ok_or("a setting needs a name and a value")?;
                 let value = value.trim().parse().map_err(|_| format!("`{value}` is no number from 0 to 65535"))?;
-                let setting = setting::named(name, value).ok_or_else(|| format!("there is no setting `{name}`"))?;
+                let setting = setting::named(name, value)
+                    .ok_or_else(|| format!("no setting `{name}`; {}", setting::NAMES.join(", ")))?;
                 Ok(Task::Command(Command::SetConfig(setting)))
             }
             Question::Reset if text == "yes" => Ok(Task::Command(Command::Reset)),
@@ -92,7 +96,9 @@ mod tests {
     fn a_typed_answer_becomes_a_task_or_an_error() {
         assert_eq!(answer(Question::GoTo, "3"), Ok(Task::Command(Command::GoTo { vertex: 3 })));
         assert!(answer(Question::GoTo, "256").unwrap_err().contains("256"));
-        assert_eq!(answer(Question::Snapshot, " a b "), Ok(Task::Snapshot("a b".into())));
+        assert_eq!(answer(Question::Snapshot, " a b "), Ok(Task::Snapshot { file: "a b".into(), force: false }));
+        let replacing = Task::Snapshot { file: "a b".into(), force: true };
+        assert_eq!(answer(Question::Snapshot, "a b  --force"), Ok(replacing));
         assert!(answer(Question::Restore, " ").is_err());
         let set = Task::Command(Command::SetConfig(Setting::NoiseMm(40)));
         assert_eq!(answer(Question::Setting, "noise-mm  40"), Ok(set));

@@ -123,6 +123,7 @@ fn live(listener: &Listener) -> Value {
         "line": {
             "messages": counters.messages,
             "lost": counters.lost,
+            "restarts": counters.restarts,
             "damaged": counters.corrupt.saturating_add(counters.cut).saturating_add(counters.too_long),
             "unknown": counters.unknown_version.saturating_add(counters.unknown_message),
         },
@@ -144,7 +145,7 @@ fn understanding(listener: &Listener) -> Value {
         Understanding::Unknown => "unknown",
         Understanding::Whole => "whole",
         Understanding::Partly { .. } => "partly",
-        Understanding::Not(_) => "not",
+        Understanding::Not(_) | Understanding::Several => "not",
     };
     json!({"level": level, "text": understanding.to_string()})
 }

@@ -27,9 +27,15 @@ pub(super) fn untangle(graph: &Graph, points: &mut [Point]) -> u32 {
         let best = moves.min_by(|(_, one_less, one), (_, other_less, other)| {
             other_less.cmp(one_less).then(one.cost.total_cmp(&other.cost))
         });
-        let Some((vertex, less, found)) = best else { return left };
-        points[vertex] = found.at;
-        left -= less;
+        let Some((vertex, _, found)) = best else { return left };
+        let stay = std::mem::replace(&mut points[vertex], found.at);
+        // What a move removes by the count of its vertex may exceed what the drawing has: the drawing decides.
+        let now = conflicts(graph, points);
+        if now >= left {
+            points[vertex] = stay;
+            return left;
+        }
+        left = now;
     }
     left
 }

@@ -136,12 +136,14 @@ fn tasks_are_executed_and_refusals_are_returned() {
 
     let directory = tempfile::tempdir().unwrap();
     let file = directory.path().join("robot.snapshot");
-    let (_, answer) = perform(Task::Snapshot(file.clone()));
+    let (_, answer) = perform(Task::Snapshot { file: file.clone(), force: false });
     let bytes = std::fs::metadata(&file).unwrap().len() as usize;
     assert_eq!(answer.unwrap(), Answer::Written(bytes));
     assert!(bytes > 0);
+    let (_, answer) = perform(Task::Snapshot { file: file.clone(), force: false });
+    assert!(matches!(answer, Err(TaskError::File(_))), "an existing file is not replaced: {answer:?}");
     let (_, answer) = perform(Task::Restore(file));
-    assert_eq!(answer.unwrap(), Answer::Restored(bytes));
+    assert_eq!(answer.unwrap(), Answer::Restored { bytes, changes: Some(Vec::new()) });
     let (_, answer) = perform(Task::Restore(directory.path().join("none")));
     assert!(matches!(answer, Err(TaskError::File(_))), "{answer:?}");
 }

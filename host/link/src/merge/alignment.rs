@@ -57,7 +57,7 @@ impl Alignment {
             taken.insert(image, vertex);
             tree.extend(from.into_iter().chain([other]));
             let [label, other_label] = [&first.vertices[usize::from(vertex)], &second.vertices[usize::from(image)]];
-            alignment.evidence.labels += background.label_nats(label.radius_mm, other_label.radius_mm, image);
+            alignment.evidence.add_label(label.radius_mm, other_label.radius_mm, image, background);
             let [ways, others] = [&first.ways[usize::from(vertex)], &second.ways[usize::from(image)]];
             let [origin_mrad, other_mrad] =
                 [ways[usize::from(way.way)].bearing_mrad, others[usize::from(other.way)].bearing_mrad];
@@ -74,7 +74,7 @@ impl Alignment {
                     && !timed.contains(&other_far)
                 {
                     timed.insert(there_id);
-                    alignment.evidence.travel += background.travel_nats(frames, other_frames);
+                    alignment.evidence.add_travel(frames, other_frames, background);
                 }
                 open.push_back((far, other_far, Some(there_id)));
             }

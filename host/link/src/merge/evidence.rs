@@ -36,6 +36,10 @@ pub struct Evidence {
     pub loops: f64,
     /// Number of edges that lead to different vertices.
     pub contradictions: u32,
+    /// Number of radii and travel times that both maps have.
+    measured: u32,
+    /// The sum of the squares of their differences in standard deviations.
+    squares: f64,
 }
 
 impl Evidence {
@@ -43,15 +47,37 @@ impl Evidence {
     pub fn total(&self) -> f64 {
         self.labels + self.ways + self.travel + self.loops + LN_CONTRADICTION * f64::from(self.contradictions)
     }
+
+    /// The root mean square of the differences of radii and travel times, in standard deviations; 0 without any.
+    pub fn misfit(&self) -> f64 {
+        (self.squares / f64::from(self.measured.max(1))).sqrt()
+    }
+
+    pub(super) fn add_label(&mut self, radius_mm: u16, other_mm: u16, image: u8, background: &Background) {
+        self.labels += background.label_nats(radius_mm, other_mm, image);
+        self.measure((f64::from(other_mm) - f64::from(radius_mm)) / RADIUS_SD_MM);
+    }
+
+    pub(super) fn add_travel(&mut self, frames: u16, other_frames: u16, background: &Background) {
+        self.travel += background.travel_nats(frames, other_frames);
+        self.measure((ln_frames(other_frames) - ln_frames(frames)) / LN_TRAVEL_SD);
+    }
+
+    fn measure(&mut self, deviations: f64) {
+        self.measured += 1;
+        self.squares += deviations * deviations;
+    }
 }
 
 impl fmt::Display for Evidence {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self { labels, ways, travel, loops, contradictions } = self;
+        let Self { labels, ways, travel, loops, contradictions, .. } = self;
         write!(
             f,
-            "{:.1} nats: radii {labels:+.1}, ways {ways:+.1}, travel times {travel:+.1}, loops {loops:+.1}, {contradictions} contradictions",
+            "{:.1} nats: radii {labels:+.1}, ways {ways:+.1}, travel times {travel:+.1}, loops {loops:+.1}, {contradictions} contradictions, \
+             misfit {:.2}",
             self.total(),
+            self.misfit(),
         )
     }
 }
@@ -91,12 +117,12 @@ impl Background {
     }
 
     /// The evidence of a radius of the first map and that of a vertex of the second.
-    pub(super) fn label_nats(&self, radius_mm: u16, other_mm: u16, image: u8) -> f64 {
+    fn label_nats(&self, radius_mm: u16, other_mm: u16, image: u8) -> f64 {
         let same = density(f64::from(other_mm) - f64::from(radius_mm), RADIUS_SD_MM);
         nats(same, self.radius[usize::from(image)], 3000.0)
     }
 
-    pub(super) fn travel_nats(&self, frames: u16, other_frames: u16) -> f64 {
+    fn travel_nats(&self, frames: u16, other_frames: u16) -> f64 {
         let (ln, other_ln) = (ln_frames(frames), ln_frames(other_frames));
         nats(density(other_ln - ln, LN_TRAVEL_SD), mean_density(other_ln, LN_TRAVEL_SD, &self.ln_travel), 4.0)
     }

@@ -36,6 +36,8 @@ const LEAST_NATS: f64 = 10.0;
 /// So is one when an alignment that contradicts it has a larger share of its evidence: the building repeats itself, and evidence of
 /// vertices side by side is then not independent.
 const RIVAL_SHARE: f64 = 0.5;
+/// So is one whose radii and travel times differ more than those of one place: a vertex of one map stands for two places.
+const MISFIT_MAX: f64 = 0.9;
 /// The most vertices of a merged map: those of the wire protocol.
 const VERTICES_MAX: usize = 64;
 
@@ -99,6 +101,7 @@ impl Part {
             && nats >= LEAST_NATS
             && self.rival_nats.is_none_or(|rival_nats| rival_nats <= RIVAL_SHARE * nats)
             && self.evidence.contradictions == 0
+            && self.evidence.misfit() <= MISFIT_MAX
     }
 }
 

@@ -13,6 +13,7 @@ use std::{
 };
 use toposlam::{NgramLength, PaperConfig};
 use toposlam_cli::progress::Progress;
+use toposlam_cli::{errln, outln, output};
 use toposlam_eval::{
     case::{Case, Placements},
     corridors::Bearings,
@@ -45,6 +46,9 @@ pub(crate) struct Arguments {
     /// reliability of the probability of a map as reliability.svg, to this directory.
     #[arg(long, value_name = "DIR", conflicts_with = "filter")]
     plot: Option<PathBuf>,
+    /// Replace existing files.
+    #[arg(long)]
+    force: bool,
     /// Output format.
     #[arg(long, default_value = "json")]
     format: Format,
@@ -150,6 +154,9 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     let settings = &evaluations[0];
     // All errors in the files are reported before the first path starts.
     let cases = arguments.cases.load()?;
+    for directory in [&arguments.export, &arguments.plot].into_iter().flatten() {
+        output::check_directory(directory, arguments.force)?;
+    }
     if let Some(directory) = &arguments.export {
         export(directory, &cases, settings).context("--export")?;
     }
@@ -163,8 +170,8 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
         plot(directory, &cases, &report, &filters, settings.longest()).context("--plot")?;
     }
     match arguments.format {
-        Format::Json => println!("{}", serde_json::to_string(&report)?),
-        Format::Table => print!("{report}"),
+        Format::Json => outln!("{}", serde_json::to_string(&report)?)?,
+        Format::Table => output::write_bytes(format!("{report}").as_bytes())?,
     }
     Ok(())
 }
@@ -177,10 +184,10 @@ fn evaluate_with_progress(case: &Case, settings: &Settings) -> anyhow::Result<Ve
     drop(bar);
     if let Some(row) = rows.first() {
         if row.paths_not_exhaustive > 0 {
-            eprintln!("{title}: {} of {} paths do not traverse every edge", row.paths_not_exhaustive, row.paths);
+            errln!("{title}: {} of {} paths do not traverse every edge", row.paths_not_exhaustive, row.paths);
         }
         if row.vertices_full > 0 {
-            eprintln!("{title}: a map had no room for a vertex, {} times in all", row.vertices_full);
+            errln!("{title}: a map had no room for a vertex, {} times in all", row.vertices_full);
         }
     }
     Ok(rows)

@@ -5,6 +5,8 @@ mod table;
 
 use anyhow::ensure;
 use clap::{Args, ValueEnum};
+use std::path::PathBuf;
+use toposlam_cli::outln;
 use toposlam_cli::progress::Progress;
 use toposlam_eval::parallel;
 use toposlam_sim::hardware::Hardware;
@@ -21,7 +23,7 @@ use table::{Case, Report};
 pub(crate) struct Arguments {
     /// Floor plans: names of built-in plans, or files (docs/plans.md).
     #[arg(long, value_name = "PLAN,...", value_delimiter = ',', default_value = "office,ring,flat")]
-    plans: Vec<String>,
+    plans: Vec<PathBuf>,
     /// Start of the robot, in metres in the frame of the only plan [default: the start of the plan, or its most open place].
     #[arg(long, value_name = "X,Y", value_parser = start, allow_hyphen_values = true)]
     start: Option<(f64, f64)>,
@@ -93,32 +95,33 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     let is_table = arguments.format == Format::Table;
     let mut report = Report::new(arguments);
     if is_table {
-        Report::print_header();
+        Report::print_header()?;
     }
     for plan_name in &arguments.plans {
         let plan = load_plan(plan_name, arguments.start)?;
+        let plan_name = plan_name.to_string_lossy();
         for &noise in &arguments.noises {
             for (robot, hardware) in &robots {
                 let title =
-                    [plan_name, *robot, "noise"].iter().filter(|part| !part.is_empty()).copied().collect::<Vec<_>>();
+                    [&*plan_name, *robot, "noise"].iter().filter(|part| !part.is_empty()).copied().collect::<Vec<_>>();
                 let title = format!("{} {noise}", title.join(" "));
                 let progress = Progress::new(title, arguments.runs * arguments.places, "places");
                 let one =
                     |run| one(arguments, &plan, noise, arguments.seed.wrapping_add(run as u64), hardware, &progress);
                 let runs = parallel::map(arguments.runs, 0, one)?.into_iter().collect::<anyhow::Result<Vec<Run>>>()?;
                 drop(progress);
-                let case = Case { plan: plan_name.clone(), robot: (*robot).to_owned(), noise, runs };
+                let case = Case { plan: plan_name.clone().into_owned(), robot: (*robot).to_owned(), noise, runs };
                 if is_table {
-                    println!("{}", case.row(arguments.places));
+                    outln!("{}", case.row(arguments.places))?;
                 }
                 report.cases.push(case);
             }
         }
     }
     if is_table {
-        report.print_details(arguments.runs_table)
+        report.print_details(arguments.runs_table)?;
     } else {
-        println!("{}", report.json(arguments.runs_table))
+        outln!("{}", report.json(arguments.runs_table))?;
     }
     Ok(())
 }

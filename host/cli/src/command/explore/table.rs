@@ -1,6 +1,8 @@
 //! The tables and the JSON object of `toposlam explore`.
 
 use serde_json::{Value, json};
+use toposlam_cli::outln;
+use toposlam_cli::output::OutputError;
 use toposlam_sim::world::HintReport;
 
 use super::Arguments;
@@ -135,48 +137,46 @@ impl Report {
     }
 
     /// Prints the head of the first table.
-    pub(super) fn print_header() {
-        println!(
+    pub(super) fn print_header() -> Result<(), OutputError> {
+        outln!(
             "| Plan | Noise | Exact maps | Visited all | Complete | Exact and whole | Located | Edge F1 | Found / missed / doubled / phantom \
              | Radius error, median / 90 % | Degree seen / right | Way lost | Frames at a wall | Stuck runs | Frames per place \
              | Goals reached / commanded / reached elsewhere |"
-        );
-        println!("|{}", "---|".repeat(16));
+        )?;
+        outln!("|{}", "---|".repeat(16))
     }
 
     /// Prints what comes after the first table: the hints, the cost of another robot, and the runs.
-    pub(super) fn print_details(&self, with_runs: bool) {
-        println!(
+    pub(super) fn print_details(&self, with_runs: bool) -> Result<(), OutputError> {
+        outln!(
             "\n| Plan | Noise | Exits wrong / unknown | Ways missed / false, of the true ones | Ways unknown | Bearing error, \
              sd / 90 % | Travel time error, sd / 90 %; each direction apart, sd |"
-        );
-        println!("|{}", "---|".repeat(7));
-        self.cases.iter().for_each(|case| println!("{}", hint_row(case)));
+        )?;
+        outln!("|{}", "---|".repeat(7))?;
+        self.cases.iter().try_for_each(|case| outln!("{}", hint_row(case)))?;
         if self.cases.iter().any(|case| !case.robot.is_empty()) {
-            println!("\n| Robot | Plan | Noise | Exact maps, this robot / the reference robot |\n|---|---|---|---|");
+            outln!("\n| Robot | Plan | Noise | Exact maps, this robot / the reference robot |\n|---|---|---|---|")?;
         }
         for pair in self.cases.chunks(2).filter(|pair| !pair[0].robot.is_empty()) {
             let exact = |case: &Case| 100.0 * case.share(|run| run.score.exact);
             if let [case, reference] = pair {
                 let Case { robot, plan, noise, .. } = case;
-                println!("| {robot} | {plan} | {noise} | {:.0} / {:.0} % |", exact(case), exact(reference));
+                outln!("| {robot} | {plan} | {noise} | {:.0} / {:.0} % |", exact(case), exact(reference))?;
             }
         }
-        if with_runs {
-            self.print_runs();
-        }
+        if with_runs { self.print_runs() } else { Ok(()) }
     }
 
-    fn print_runs(&self) {
-        println!(
+    fn print_runs(&self) -> Result<(), OutputError> {
+        outln!(
             "\n| Plan | Noise | Seed | Exact | Visited all | Complete | Exact and whole | Located | Edge F1 \
              | Found / missed / doubled / phantom | Way lost | Frames at a wall | Stuck | Places | Frames |"
-        );
-        println!("|{}", "---|".repeat(15));
+        )?;
+        outln!("|{}", "---|".repeat(15))?;
         let yes = |answer: bool| if answer { "yes" } else { "no" };
         for case in &self.cases {
             for run in &case.runs {
-                println!(
+                outln!(
                     "| {} | {} | {} | {} | {} | {} | {} | {:.1} % | {:.2} | {} / {} / {} / {} | {} | {} | {} | {} | {} |",
                     case.name(),
                     case.noise,
@@ -196,9 +196,10 @@ impl Report {
                     yes(run.stuck),
                     run.places,
                     run.frames,
-                );
+                )?;
             }
         }
+        Ok(())
     }
 
     /// One JSON object with the settings and a row for each plan, noise and robot.

@@ -8,6 +8,7 @@ use ratatui::text::{Line as TextLine, Span};
 use ratatui::widgets::Block;
 use ratatui::widgets::canvas::{Canvas, Circle, Context, Line};
 
+use super::labels::{Label, Placed, place};
 use super::vertices::permille_at;
 use super::{FAINT, HERE};
 use crate::monitor::model::Model;
@@ -30,6 +31,41 @@ pub(super) fn draw(frame: &mut Frame<'_>, area: Rect, model: &Model) {
         .y_bounds(y_bounds)
         .paint(|context| paint(context, model));
     frame.render_widget(canvas, area);
+    print_labels(frame, inside, (x_bounds, y_bounds), model);
+}
+
+/// Prints the labels over the drawing, those of the robot and of its possible vertices first.
+fn print_labels(frame: &mut Frame<'_>, area: Rect, (x_bounds, y_bounds): ([f64; 2], [f64; 2]), model: &Model) {
+    let cell = |value: f64, [least, most]: [f64; 2], cells: u16| {
+        ((value - least) / (most - least) * f64::from(cells.saturating_sub(1))) as u16
+    };
+    let vertices = &model.watch().map().vertices;
+    let mut numbers: Vec<usize> = (0..vertices.len().min(model.watch().points().len())).collect();
+    numbers.sort_by_key(|&number| (!is_here(model, number), permille_at(model, number).is_none()));
+    let texts: Vec<(Span<'static>, Vec<TextLine<'static>>)> =
+        numbers.iter().map(|&number| label(model, number, vertices[number].radius_mm)).collect();
+    let labels: Vec<Label> = numbers
+        .iter()
+        .zip(&texts)
+        .map(|(&number, (name, details))| {
+            let point = model.watch().points()[number];
+            Label {
+                column: area.x + cell(point.x, x_bounds, area.width),
+                row: area.y + cell(-point.y, [-y_bounds[1], -y_bounds[0]], area.height),
+                number_width: name.width() as u16,
+                details: details.iter().map(|detail| detail.width() as u16).collect(),
+            }
+        })
+        .collect();
+    let buffer = frame.buffer_mut();
+    for ((name, details), placed) in texts.into_iter().zip(place(&labels, area)) {
+        let Some(Placed { column, row, detail }) = placed else { continue };
+        let (after, _) = buffer.set_span(column, row, &name, area.right().saturating_sub(column));
+        if let Some(detail) = detail {
+            buffer.set_string(after, row, " ", Style::new());
+            buffer.set_line(after + 1, row, &details[detail], area.right().saturating_sub(after + 1));
+        }
+    }
 }
 
 fn paint(context: &mut Context<'_>, model: &Model) {
@@ -54,23 +90,20 @@ fn paint(context: &mut Context<'_>, model: &Model) {
         let radius = LEAST + (WIDEST - LEAST) * f64::from(vertex.radius_mm) / f64::from(widest_mm);
         context.draw(&Circle { x: point.x, y: point.y, radius, color: color_of(model, number) });
     }
-    context.layer();
-    for (number, (vertex, point)) in map.vertices.iter().zip(points).enumerate() {
-        context.print(point.x, point.y, label(model, number, vertex.radius_mm));
-    }
 }
 
-fn label(model: &Model, number: usize, radius_mm: u16) -> TextLine<'static> {
+/// The number of a vertex, and its details, the longest first.
+fn label(model: &Model, number: usize, radius_mm: u16) -> (Span<'static>, Vec<TextLine<'static>>) {
     let color = color_of(model, number);
     let is_here = is_here(model, number);
     let name = format!("{}{number}", if is_here { "@" } else { "" });
-    let permille = permille_at(model, number).map_or(String::new(), |permille| format!(" {permille}‰"));
     let style = if is_here { HERE } else { Style::new().fg(color) };
-    TextLine::from(vec![
-        Span::styled(name, style),
-        Span::styled(format!(" {radius_mm}"), FAINT),
-        Span::styled(permille, Style::new().fg(color)),
-    ])
+    let radius = Span::styled(radius_mm.to_string(), FAINT);
+    let permille =
+        permille_at(model, number).map(|permille| Span::styled(format!("{permille}‰"), Style::new().fg(color)));
+    let both = permille.clone().map(|permille| TextLine::from(vec![radius.clone(), Span::raw(" "), permille]));
+    let details = both.into_iter().chain([TextLine::from(permille.unwrap_or(radius))]);
+    (Span::styled(name, style), details.collect())
 }
 
 fn color_of(model: &Model, number: usize) -> Color {

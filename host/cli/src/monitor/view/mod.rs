@@ -5,6 +5,7 @@
 
 mod beliefs;
 mod help;
+mod labels;
 mod map;
 mod ring;
 mod robot;
@@ -124,7 +125,9 @@ fn banners(model: &Model, width: u16) -> Vec<(Paragraph<'_>, u16)> {
     match understanding {
         Understanding::Unknown | Understanding::Whole => {}
         Understanding::Partly { .. } => texts.push((understanding.to_string(), WARNING)),
-        Understanding::Not(_) => texts.push((format!("DO NOT TRUST WHAT IS SHOWN: {understanding}"), ALARM)),
+        Understanding::Not(_) | Understanding::Several => {
+            texts.push((format!("DO NOT TRUST WHAT IS SHOWN: {understanding}"), ALARM))
+        }
     }
     if *model.watch().connection() == Connection::Open
         && let Some(silence) = model.silence()

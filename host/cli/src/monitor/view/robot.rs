@@ -8,7 +8,7 @@ use toposlam::FaultKind;
 
 use super::{BAD, FAINT, GOOD, boxed};
 use crate::monitor::model::Model;
-use toposlam_link::event_text::{drive_state, seconds};
+use toposlam_link::event_text::{self, drive_state, seconds};
 
 pub(super) fn draw(frame: &mut Frame<'_>, area: Rect, model: &Model) {
     let listener = model.watch().listener();
@@ -35,7 +35,7 @@ pub(super) fn draw(frame: &mut Frame<'_>, area: Rect, model: &Model) {
         )));
     }
     lines.push(match picture.hello() {
-        Some(hello) => Line::from(format!("start {} ({}), seed {}", hello.boot, hello.reset_cause, hello.seed)),
+        Some(hello) => Line::from(event_text::start(&hello)),
         None => Line::styled(listener.understanding().to_string(), FAINT),
     });
     boxed(frame, area, "what it does", lines);
