@@ -1,5 +1,5 @@
 //! Which n-grams tell places with equal labels apart, on random graphs without noise: the study of Werner, Maire and Sitte that the
-//! paper cites as [8].
+//! paper cites as \[8\].
 //!
 //! A place is *aliased* when another place has its label. For each environment the study finds the smallest n for which the
 //! smallest map with the n-grams of the environment is unique and has exactly its walks. `docs/aliasing.md` describes it.
