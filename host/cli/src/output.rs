@@ -56,7 +56,7 @@ impl fmt::Display for ExitError {
 
 impl std::error::Error for ExitError {}
 
-/// Writes a formatted line to the standard output; a `Result` with an [`OutputError`](output::OutputError).
+/// Writes a formatted line to the standard output; a `Result` with an [`OutputError`](crate::output::OutputError).
 #[macro_export]
 macro_rules! outln {
     ($($text:tt)*) => {
