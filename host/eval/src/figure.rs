@@ -1,11 +1,9 @@
 //! Histograms of two filters side by side, as SVG: the paper's Fig. 4 and 5.
 
 use super::report::{BIN_MM, Row};
+use crate::chart::{self, FAINT, INK, line, words};
 use std::collections::{BTreeMap, BTreeSet};
-use svg::{
-    Document,
-    node::element::{Group, Line, Rectangle, Text, Title},
-};
+use svg::node::element::{Group, Rectangle};
 
 /// The quantity that a histogram shows.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -26,8 +24,6 @@ pub struct Pair<'a> {
 }
 
 const COLOURS: [&str; 2] = ["#1f6f8b", "#b3261e"];
-const INK: &str = "#222222";
-const FAINT: &str = "#dcdcdc";
 const PANEL: (f64, f64) = (420.0, 220.0);
 /// Margins of a panel: left for the shares, above for the name, below for the axis.
 const LEFT: f64 = 66.0;
@@ -46,13 +42,7 @@ pub fn draw(quantity: Quantity, pairs: &[Pair]) -> String {
         Quantity::Consistency => "Distance of the maps from the n-grams of the environment (d_H, Eq. 2)",
         Quantity::Vertices => "Number of vertices of the maps",
     };
-    let mut document = Document::new()
-        .set("viewBox", (0, 0, width, height))
-        .set("width", width)
-        .set("font-family", "sans-serif")
-        .add(Title::new(title))
-        .add(Rectangle::new().set("width", "100%").set("height", "100%").set("fill", "white"))
-        .add(words(title, LEFT, 32.0, 19.0).set("font-weight", "bold"));
+    let mut document = chart::page((width, height), title, (LEFT, 32.0), 19.0);
     for (line, pair) in pairs.iter().enumerate() {
         let top = HEAD + line_height * line as f64;
         let [row, _] = pair.rows;
@@ -184,14 +174,6 @@ fn tick_labels(quantity: Quantity, bins: &[Option<usize>]) -> Vec<(usize, String
         None => Some((slot, "∞".to_owned())),
     };
     bins.iter().enumerate().filter_map(label).collect()
-}
-
-fn words(words: &str, x: f64, y: f64, size: f64) -> Text {
-    Text::new(words).set("x", x).set("y", y).set("font-size", size).set("fill", INK)
-}
-
-fn line(from: (f64, f64), to: (f64, f64), colour: &str) -> Line {
-    Line::new().set("x1", from.0).set("y1", from.1).set("x2", to.0).set("y2", to.1).set("stroke", colour)
 }
 
 #[cfg(test)]

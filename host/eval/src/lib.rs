@@ -14,6 +14,7 @@ pub mod aliasing;
 pub mod ancestry;
 pub mod candidate;
 pub mod case;
+mod chart;
 pub mod corridors;
 mod embedding;
 pub mod environment;

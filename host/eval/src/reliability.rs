@@ -1,11 +1,9 @@
 //! How far the probability of a map can be believed: among maps of a stated probability, the share that is right, and the
 //! reliability diagram.
 
+use crate::chart::{self, FAINT, INK, line, words};
 use serde::Serialize;
-use svg::{
-    Document,
-    node::element::{Circle, Group, Line, Rectangle, Text, Title},
-};
+use svg::node::element::{Circle, Group};
 
 /// Number of bins of the stated probability.
 pub const BINS: usize = 10;
@@ -73,8 +71,6 @@ impl Reliability {
 }
 
 const COLOURS: [&str; 2] = ["#1f6f8b", "#b3261e"];
-const INK: &str = "#222222";
-const FAINT: &str = "#dcdcdc";
 const SIDE: f64 = 320.0;
 const LEFT: f64 = 64.0;
 const ABOVE: f64 = 76.0;
@@ -84,13 +80,7 @@ const ABOVE: f64 = 76.0;
 pub fn draw(filters: &[(&str, Reliability)]) -> String {
     let (width, height) = (LEFT + filters.len() as f64 * (SIDE + LEFT), ABOVE + SIDE + 60.0);
     let title = "Maps that are exact, over the stated probability of the map";
-    let mut document = Document::new()
-        .set("viewBox", (0, 0, width, height))
-        .set("width", width)
-        .set("font-family", "sans-serif")
-        .add(Title::new(title))
-        .add(Rectangle::new().set("width", "100%").set("height", "100%").set("fill", "white"))
-        .add(words(title, LEFT, 28.0, 16.0).set("font-weight", "bold"));
+    let mut document = chart::page((width, height), title, (LEFT, 28.0), 16.0);
     for (number, (name, reliability)) in filters.iter().enumerate() {
         let left = LEFT + number as f64 * (SIDE + LEFT);
         let heading = format!("{name} filter: mean error {:.3}", reliability.error());
@@ -133,14 +123,6 @@ fn panel(reliability: &Reliability, number: usize) -> Group {
     panel
         .add(line(at(0.0, 0.0), at(1.0, 0.0), INK))
         .add(words("stated probability", SIDE / 2.0, SIDE + 38.0, 13.0).set("text-anchor", "middle"))
-}
-
-fn words(words: &str, x: f64, y: f64, size: f64) -> Text {
-    Text::new(words).set("x", x).set("y", y).set("font-size", size).set("fill", INK)
-}
-
-fn line(from: (f64, f64), to: (f64, f64), colour: &str) -> Line {
-    Line::new().set("x1", from.0).set("y1", from.1).set("x2", to.0).set("y2", to.1).set("stroke", colour)
 }
 
 #[cfg(test)]

@@ -2,15 +2,11 @@
 //! that the search expands over the number of places.
 
 use super::{LENGTHS, Outcome, Report, Row};
+use crate::chart::{self, FAINT, INK, line, vertical_axis, words};
 use std::collections::BTreeSet;
-use svg::{
-    Document,
-    node::element::{Circle, Group, Line, Path, Rectangle, Text, Title, path::Data},
-};
+use svg::node::element::{Circle, Group, Path, path::Data};
 
 const COLOURS: [&str; 6] = ["#1f6f8b", "#b3261e", "#6a8f2f", "#8b5fbf", "#c77d11", "#4d4d4d"];
-const INK: &str = "#222222";
-const FAINT: &str = "#dcdcdc";
 const PANEL: (f64, f64) = (300.0, 220.0);
 const LEFT: f64 = 62.0;
 const GAP: f64 = 70.0;
@@ -28,13 +24,7 @@ pub fn draw(report: &Report) -> String {
     let sizes: Vec<usize> = report.rows.iter().map(|row| row.places).collect::<BTreeSet<_>>().into_iter().collect();
     let (width, height) = (LEFT + kinds.len() as f64 * (PANEL.0 + GAP), HEAD + 2.0 * (PANEL.1 + BELOW) + 10.0);
     let title = "n-grams that tell aliased places apart";
-    let mut document = Document::new()
-        .set("viewBox", (0, 0, width, height))
-        .set("width", width)
-        .set("font-family", "sans-serif")
-        .add(Title::new(title))
-        .add(Rectangle::new().set("width", "100%").set("height", "100%").set("fill", "white"))
-        .add(words(title, LEFT, 26.0, 16.0).set("font-weight", "bold"));
+    let mut document = chart::page((width, height), title, (LEFT, 26.0), 16.0);
     for (number, size) in sizes.iter().enumerate() {
         let x = LEFT + 400.0 + 90.0 * number as f64;
         document = document
@@ -91,7 +81,7 @@ fn lengths(rows: &[&Row], sizes: &[usize]) -> Group {
     panel
         .add(line((0.0, height), (width, height), INK))
         .add(words("aliased places", width / 2.0, height + 37.0, 13.0).set("text-anchor", "middle"))
-        .add(turned("n that suffices", height))
+        .add(vertical_axis("n that suffices", height))
 }
 
 /// The expanded nodes over the number of places, and their median.
@@ -128,24 +118,11 @@ fn nodes(rows: &[&Row], sizes: &[usize]) -> Group {
     panel
         .add(line((0.0, height), (width, height), INK))
         .add(words("places", width / 2.0, height + 37.0, 13.0).set("text-anchor", "middle"))
-        .add(turned("nodes of the search", height))
+        .add(vertical_axis("nodes of the search", height))
 }
 
 fn colour(number: usize) -> &'static str {
     COLOURS[number % COLOURS.len()]
-}
-
-fn words(words: &str, x: f64, y: f64, size: f64) -> Text {
-    Text::new(words).set("x", x).set("y", y).set("font-size", size).set("fill", INK)
-}
-
-/// The name of a vertical axis.
-fn turned(name: &str, height: f64) -> Text {
-    words(name, -height / 2.0, -44.0, 13.0).set("text-anchor", "middle").set("transform", "rotate(-90)")
-}
-
-fn line(from: (f64, f64), to: (f64, f64), colour: &str) -> Line {
-    Line::new().set("x1", from.0).set("y1", from.1).set("x2", to.0).set("y2", to.1).set("stroke", colour)
 }
 
 #[cfg(test)]
