@@ -137,8 +137,10 @@ fn check_counters<M>(decoded: &[Decoded<M>], counters: DecoderCounters) {
         match decoded {
             Decoded::Message(header, _) => {
                 expected.messages += 1;
-                if let Arrival::AfterGap { lost } = header.arrival {
-                    expected.lost += u32::from(lost);
+                match header.arrival {
+                    Arrival::AfterGap { lost } => expected.lost += u32::from(lost),
+                    Arrival::Restart => expected.restarts += 1,
+                    Arrival::First | Arrival::InOrder | Arrival::Late => {}
                 }
             }
             Decoded::Error(DecodeError::Corrupt) => expected.corrupt += 1,
