@@ -143,7 +143,7 @@ class Page(unittest.TestCase):
         self.assertRegex(self.text("summary"), f"{vertices} vertices, {edges} edges{explored}; the robot is at vertex {here}")
         self.assertTrue(self.browser.find_element(By.ID, "map").accessible_name.startswith(f"The map: {vertices} vertices"))
         self.assertRegex(self.text("belief"), r"this map\d+\.\d %its rivals\d+\.\d %consistency(\d+ mm|infinite)")
-        self.assertIn("speed0.0 %", self.text("drive"))
+        self.wait("it stands", lambda: "speed0.0 %" in self.text("drive"))
         # The policy of the page lets everything through that the page does.
         self.assertEqual(self.browser.get_log("browser"), [])
 
