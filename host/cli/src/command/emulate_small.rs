@@ -9,7 +9,7 @@ use std::time::Duration;
 
 use anyhow::{Context, bail, ensure};
 use toposlam::reference::small::{self, DARTS, Filter, HISTORY, HYPOTHESES, VERTICES};
-use toposlam::wire::{Decoder, Message, Progress as Decoded};
+use toposlam::wire::{Decoder, Hello, Message, Progress as Decoded};
 use toposlam_cli::emulator::microbit::Microbit;
 use toposlam_cli::outln;
 use toposlam_cli::progress::Progress;
@@ -82,9 +82,15 @@ pub(super) fn run<const SONARS: usize>(
     Ok(())
 }
 
-/// Whether two messages are equal. The reports of the board differ: time and stack.
+/// Whether two messages are equal. The reports of the board differ, time and stack, and the session id, which depends on the time.
 fn is_same(firmware: &Message, simulation: &Message) -> bool {
-    matches!((firmware, simulation), (Message::Health(_), Message::Health(_))) || firmware == simulation
+    match (firmware, simulation) {
+        (Message::Health(_), Message::Health(_)) => true,
+        (Message::Hello(firmware), Message::Hello(simulation)) => {
+            Hello { session: simulation.session, ..*firmware } == *simulation
+        }
+        _ => firmware == simulation,
+    }
 }
 
 /// The decoders of both lines.
