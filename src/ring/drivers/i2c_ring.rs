@@ -2,7 +2,7 @@
 
 use embedded_hal::{
     delay::DelayNs,
-    i2c::{Error as _, ErrorKind, I2c},
+    i2c::{Error, ErrorKind, I2c},
 };
 
 use super::{FiringPlan, Reading, SonarError, SonarFault, SonarRing, reading::Readings};
@@ -108,10 +108,7 @@ impl<BUS: I2c, DELAY: DelayNs, RANGER: I2cRanger<SONARS>, const SONARS: usize> I
     }
 
     fn start_at(&mut self, address: u8) -> Result<(), SonarFault> {
-        self.ranger.start(&mut self.bus, address).map_err(|error| match error.kind() {
-            ErrorKind::NoAcknowledge(_) => SonarFault::Silent,
-            _ => SonarFault::Bus,
-        })
+        self.ranger.start(&mut self.bus, address).map_err(|error| fault(&error))
     }
 
     fn poll(&mut self, address: u8) -> Reading {
@@ -165,6 +162,14 @@ impl<BUS: I2c, DELAY: DelayNs, RANGER: I2cRanger<SONARS>, const SONARS: usize> S
 
     fn last_error(&self) -> Option<SonarError> {
         self.last_error
+    }
+}
+
+/// The fault of a message that failed.
+pub(super) fn fault(error: &impl Error) -> SonarFault {
+    match error.kind() {
+        ErrorKind::NoAcknowledge(_) => SonarFault::Silent,
+        _ => SonarFault::Bus,
     }
 }
 

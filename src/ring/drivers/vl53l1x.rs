@@ -10,14 +10,12 @@
 //! divides by a number that it reads from the sensor and does not return the status of a range.
 
 use crate::setters::setters;
-use embedded_hal::{
-    delay::DelayNs,
-    digital::OutputPin,
-    i2c::{ErrorKind, I2c},
-};
+use embedded_hal::{delay::DelayNs, digital::OutputPin, i2c::I2c};
 
 use super::{
-    FiringPlan, I2cRanger, I2cRing, RangingTiming, Reading, SonarFault, i2c_ring::check_addresses, vl53l1x_settings,
+    FiringPlan, I2cRanger, I2cRing, RangingTiming, Reading, SonarFault,
+    i2c_ring::{check_addresses, fault},
+    vl53l1x_settings,
 };
 use crate::config_error::ConfigError;
 use crate::ring::Echo;
@@ -183,13 +181,6 @@ impl<const SONARS: usize> Vl53l1xConfig<SONARS> {
 
 /// Measures with the period of [`register::PERIOD`].
 const MEASURE: u8 = 0x40;
-
-fn fault(error: &impl embedded_hal::i2c::Error) -> SonarFault {
-    match error.kind() {
-        ErrorKind::NoAcknowledge(_) => SonarFault::Silent,
-        _ => SonarFault::Bus,
-    }
-}
 
 fn write<BUS: I2c, const BYTES: usize>(
     bus: &mut BUS,
