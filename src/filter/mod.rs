@@ -30,6 +30,11 @@ pub(crate) fn draws(seed: u64, number: u64) -> Xoshiro128PlusPlus {
     Xoshiro128PlusPlus::seed_from_u64(seed.wrapping_add(number.wrapping_mul(0x9E37_79B9_7F4A_7C15)))
 }
 
+/// A number between 0 and 1, without either, from 24 random bits.
+pub(crate) fn uniform(bits: u32) -> f32 {
+    ((bits >> 8) as f32 + 0.5) / (1 << 24) as f32
+}
+
 /// The best hypothesis after an observation.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Update {

@@ -1,5 +1,7 @@
 //! Natural logarithms in some twenty instructions, and tables of logarithms.
 
+use crate::filter::uniform;
+
 /// ln 2.
 const LN_2: f32 = core::f32::consts::LN_2;
 
@@ -47,11 +49,6 @@ pub(super) const fn ln(x: f32) -> f32 {
 /// Noise that makes the largest of perturbed logarithms a draw, from 24 random bits.
 pub(super) fn gumbel(bits: u32) -> f32 {
     -ln(-ln(uniform(bits)))
-}
-
-/// A number between 0 and 1, without either, from 24 random bits.
-pub(super) fn uniform(bits: u32) -> f32 {
-    ((bits >> 8) as f32 + 0.5) / (1 << 24) as f32
 }
 
 /// ln k; 0 for k = 0.

@@ -1,4 +1,6 @@
-//! ln Γ and its derivative in single precision.
+//! ln Γ and its derivative in single precision, and Gumbel noise.
+
+use crate::filter::uniform;
 
 /// ½ ln 2π.
 pub(crate) const HALF_LN_2_PI: f32 = 0.918_938_5;
@@ -22,6 +24,11 @@ pub(super) fn digamma(x: f32) -> f32 {
     }
     let inverse = 1.0 / shifted;
     libm::logf(shifted) - 0.5 * inverse - inverse * inverse / 12.0 - shift
+}
+
+/// Noise that makes the largest of perturbed logarithms a draw, from 24 random bits.
+pub(super) fn gumbel(bits: u32) -> f32 {
+    -libm::logf(-libm::logf(uniform(bits)))
 }
 
 #[cfg(test)]

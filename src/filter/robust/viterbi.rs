@@ -6,6 +6,7 @@ use super::hmm::Hmm;
 use super::hypothesis::{Hypothesis, ln};
 use super::lattice::{Cells, Lattice, Semiring, Stage};
 use super::model::{Model, NEW_EDGE_COST};
+use super::special_functions::gumbel;
 use crate::filter::Exit;
 use crate::map::{VertexId, VertexSet32};
 use rand_core::Rng;
@@ -169,8 +170,7 @@ impl<const V: usize> Semiring for BestPath<'_, V> {
         if let Some(random) = &mut self.noise {
             for state in column.states_mut() {
                 // Gumbel noise: the best of perturbed sums is a draw.
-                let uniform = ((random.next_u32() >> 8) as f32 + 0.5) / (1 << 24) as f32;
-                state.ln_emission += -libm::logf(-libm::logf(uniform));
+                state.ln_emission += gumbel(random.next_u32());
             }
         }
     }

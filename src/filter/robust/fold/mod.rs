@@ -13,6 +13,7 @@ mod tests;
 use super::history::ObservationHistory;
 use super::hypothesis::Hypothesis;
 use super::model::Model;
+use super::special_functions::gumbel;
 use crate::map::VertexId;
 use automaton::{Automaton, NODES, NONE, Node, PerNode};
 use categories::{Categories, Category};
@@ -233,12 +234,8 @@ impl<const T: usize> Fold<T> {
             work += MERGE_WORK * merged;
             let has_to_merge = self.placed == self.known && usize::from(self.automaton.classes()) > vertices;
             if let Some(gain) = gain.filter(|&gain| gain > 0.0 || has_to_merge) {
-                let drawn = if self.temperature > 0.0 {
-                    let uniform = ((random.next_u32() >> 8) as f32 + 0.5) / (1 << 24) as f32;
-                    gain / self.temperature - libm::logf(-libm::logf(uniform))
-                } else {
-                    gain
-                };
+                let drawn =
+                    if self.temperature > 0.0 { gain / self.temperature + gumbel(random.next_u32()) } else { gain };
                 if self.best.is_none_or(|best| drawn > best.0) {
                     self.best = Some((drawn, first, second));
                 }
