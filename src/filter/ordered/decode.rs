@@ -1,20 +1,21 @@
 //! Decoding: the path that explains the record best on the map of the source, where that path is broken.
 //!
 //! A repair that removes vertices or edges of its source leaves the path of the source broken. The decoder follows the path up to
-//! some places before a break, keeps the best few ways by which the robot may have come to each place from there on (a beam of the Viterbi
-//! algorithm), and stops where the best of them is on the path again. The map does not change but for edges between two frontiers that
-//! the decoded path passes.
+//! some places before a break, keeps the best few ways by which the robot may have come to each place from there on (the Viterbi
+//! algorithm with a beam), and stops where the best of them is on the path again. The map changes only by edges between two
+//! frontiers that the decoded path passes.
 
 use super::choice::{ReportedExit, UNSEEN};
 use super::hypothesis::Hypothesis;
 use super::model::Model;
 use super::record::Record;
+use super::replay::WORST_EXIT;
 use crate::map::{NONE, VertexId, VertexSet};
 
-/// How many ways are kept for a place.
+/// The number of ways that are kept for a place.
 const STATES: usize = 8;
 
-/// How many places are decided together.
+/// The number of places that are decided together.
 const LAG: usize = 48;
 
 /// The decoder starts this many places before a break.
@@ -23,11 +24,15 @@ const BEFORE: usize = 4;
 /// Ways that are this much less likely than the best one are dropped, in nats.
 const UNLIKELY: f32 = 16.0;
 
-/// When all others are this much less likely, the path is taken.
+/// The best way is certain when all others are this much less likely, in nats.
 const CERTAIN: f32 = 6.0;
 
-/// Exits that cost more than this are not considered, in nats.
-const WORST_EXIT: f32 = -8.0;
+/// The cost of leaving the map where neither a frontier nor a way that no visit has shown explains it, in nats.
+const LOST: f32 = 10.0;
+
+/// Edges, and places anywhere on the map, are not considered from a state that is this far behind the best next one, in nats.
+const BEHIND_BY_EDGE: f32 = 40.0;
+const BEHIND_ANYWHERE: f32 = 30.0;
 
 /// A way by which the robot may have come to a place: [`NONE`] for a place that is not on the map.
 #[derive(Clone, Copy, Debug)]
@@ -61,7 +66,7 @@ struct Next {
     states: [State; STATES],
     scores: [f32; STATES],
     count: usize,
-    /// How many states were looked at.
+    /// How many states were evaluated.
     work: u32,
 }
 
@@ -96,7 +101,7 @@ impl Next {
         set(&mut self.scores, position, score);
     }
 
-    /// How much worse than the best state one would be.
+    /// How far a state with this score would be behind the best one.
     fn behind(&self, score: f32) -> f32 {
         if self.count == 0 { 0.0 } else { self.scores.first().map_or(0.0, |best| best - score) }
     }
@@ -131,7 +136,8 @@ impl Decoder {
         VertexId::new(vertex).is_some_and(|vertex| self.removed.contains(vertex))
     }
 
-    /// Decodes from place `index` on until `work` states were looked at. Returns the next place; the length of the record at the end.
+    /// Decodes from place `index` on until `work` states were evaluated. Returns the next place, which is the length of the record at the
+    /// end, and how many states were evaluated.
     pub(super) fn run<const V: usize, const D: usize, const T: usize>(
         &mut self,
         model: &Model,
@@ -160,8 +166,8 @@ impl Decoder {
             index += 1;
             let is_certain = self.count == 1 || self.scores.get(1).is_some_and(|&second| second < -CERTAIN);
             let best = self.best();
-            let goes_on = index < record.len() && self.is_broken_before(record, on, index);
-            if is_certain && best == on.came_by(index - 1) && best != NONE && !goes_on {
+            let is_on_path = best == on.came_by(index - 1) && best != NONE;
+            if is_certain && is_on_path && !self.is_broken_ahead(record, on, index) {
                 self.take(record, on, index);
                 self.places = 0;
             } else if usize::from(self.places) == LAG {
@@ -176,8 +182,8 @@ impl Decoder {
         (index, done)
     }
 
-    /// Whether the path is broken at one of the next places.
-    fn is_broken_before<const V: usize, const D: usize, const T: usize>(
+    /// Whether the path is broken at one of the next [`BEFORE`] places.
+    fn is_broken_ahead<const V: usize, const D: usize, const T: usize>(
         &self,
         record: &Record<T>,
         on: &Hypothesis<V, D, T>,
@@ -186,7 +192,7 @@ impl Decoder {
         (index..(index + BEFORE).min(record.len())).any(|place| self.is_broken(record, on, place))
     }
 
-    /// Whether the map says nothing of how the path comes to a place.
+    /// Whether the map has no way by which the path comes to a place.
     fn is_broken<const V: usize, const D: usize, const T: usize>(
         &self,
         record: &Record<T>,
@@ -234,7 +240,7 @@ impl Decoder {
         }
     }
 
-    /// Writes the best states into the path, `end` being the place after the newest. Joins frontiers between which the path goes.
+    /// Writes the best states into the path; `end` is the place after the newest. Joins frontiers between which the path leads.
     fn take<const V: usize, const D: usize, const T: usize>(
         &mut self,
         record: &Record<T>,
@@ -290,13 +296,13 @@ impl Decoder {
         for (before, (state, &score)) in states.iter().zip(&self.scores).take(self.count.into()).enumerate() {
             if state.came_by == NONE || entry.starts() {
                 next.insert(NONE, before, score + off_map);
-                if next.behind(score - anywhere) > 30.0 {
+                if next.behind(score - anywhere) > BEHIND_ANYWHERE {
                     continue;
                 }
                 (0..on.map.darts()).for_each(|dart| arrive(&mut next, dart, before, score - anywhere));
                 continue;
             }
-            next.insert(NONE, before, score + off_map - 10.0);
+            next.insert(NONE, before, score + off_map - LOST);
             let reported = on.reported_exit(record, index, state.came_by);
             let ways = on.map.ways(on.map.vertex(state.came_by));
             if reported == ReportedExit::Unseen {
@@ -311,7 +317,7 @@ impl Decoder {
                 }
                 match on.map.partner(exit) {
                     Some(partner) if !self.is_removed(on.map.vertex(partner)) => {
-                        if next.behind(cost) < 40.0 {
+                        if next.behind(cost) < BEHIND_BY_EDGE {
                             let travel = model.travel(on.map.travel(partner), entry.ln_travel);
                             arrive(&mut next, partner, before, cost + travel);
                         }

@@ -18,7 +18,7 @@ const ROLLOUT_WORST: f32 = -9.0;
 const DOUBT: f32 = -4.0;
 
 /// Exits that cost more than this are not considered, in nats.
-const WORST_EXIT: f32 = -8.0;
+pub(super) const WORST_EXIT: f32 = -8.0;
 
 /// How many places a rollout looks ahead.
 const LOOKAHEAD: usize = 10;
