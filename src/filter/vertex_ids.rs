@@ -63,8 +63,8 @@ impl<const V: usize> VertexIds<V> {
     }
 
     /// Gives the vertices of the best hypothesis their ids. The first `kept` vertices are the same as at the last update, and keep
-    /// theirs. Another one takes the id of the published vertex that it shares most
-    /// observations with; one without observations in the history that of the published vertex with the nearest label.
+    /// theirs. Another one takes the id of the published vertex that it shares most observations with; one without observations in
+    /// the history that of the published vertex with the nearest label.
     ///
     /// `map` is what was published last. `observations` are the published vertex and the vertex of the best hypothesis of each
     /// observation of the history, `T` at most; those without one of the two are left out. `label` is the mean label of a vertex
@@ -123,10 +123,10 @@ impl<const V: usize> VertexIds<V> {
             ids[vertex] = Some(id);
             taken.insert(id);
         }
+        // The heirs, as vertices of the best hypothesis until they have their ids.
         for (before, remapped) in self.remapped.iter_mut() {
             let same = VertexId::first(kept).find(|&vertex| self.ids[vertex] == before);
-            let heir = same.or_else(|| shared.iter().find(|pair| pair.id == before).map(|pair| pair.vertex));
-            *remapped = heir;
+            *remapped = same.or_else(|| shared.iter().find(|pair| pair.id == before).map(|pair| pair.vertex));
         }
         // New vertices take the ids that are free.
         for vertex in VertexId::first(vertices) {
