@@ -40,6 +40,7 @@ const SEARCH_FRAMES: u16 = 24;
 const DEPART_FRAMES: u16 = 8;
 /// An edge may take as many times the time of a manoeuvre.
 const EDGE_TIMEOUTS: u16 = 20;
+
 /// What the drive is doing.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u8)]

@@ -11,7 +11,7 @@ impl<const N: usize, const V: usize, const D: usize, const T: usize> OrderedFilt
     /// hypotheses from now on. Cost: as a refinement of all places.
     pub(super) fn drop_oldest(&mut self) {
         self.repair_nothing();
-        // What the base has keeps its ids: the best hypothesis must have some.
+        // The vertices of the base keep their ids, so those of the best hypothesis need ids first.
         self.publish();
         self.vertex_ids.defer();
         let (len, dropped) = (self.record.len(), (self.record.len() / 4).max(1));

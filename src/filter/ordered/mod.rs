@@ -2,8 +2,8 @@
 //!
 //! A hypothesis is a map and the way by which the robot came to the newest place. While the way by which it leaves is known, the
 //! next place follows; at a frontier it is a new vertex, or any vertex with a frontier that fits. Repair builds the best maps
-//! again from the newest observations with one closure undone, with two vertices folded onto each other, or
-//! with a part of the map removed.
+//! again from the newest observations with one closure undone, with two vertices folded onto each other, or with a part of the map
+//! removed.
 
 mod beam;
 mod choice;

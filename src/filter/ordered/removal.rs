@@ -1,14 +1,14 @@
 //! Removal: a repair that takes a part off the map of its source, and finds where the robot was instead.
 //!
-//! What is on the map twice is seldom folded by a single repair, because what follows from the fold contradicts the path of the source. With one of the
-//! two copies gone, the decoder leads the path over the other one.
+//! A single repair seldom folds what is on the map twice, because what follows from the fold contradicts the path of the source.
+//! Without one of the two copies, the decoder leads the path over the other one.
 
 use super::OrderedFilter;
 use super::repair::below;
 use crate::map::{NONE, VertexId, VertexSet};
 use rand_xoshiro::Xoshiro128PlusPlus;
 
-/// The work of one step: how many arrivals at a place are weighed.
+/// The work of one step: the number of arrivals at a place that are evaluated.
 const ARRIVALS: u32 = 600;
 
 /// The draft is started in the same step after at most this many.

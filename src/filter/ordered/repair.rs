@@ -3,7 +3,8 @@
 //! A repair starts from one of the hypotheses, its source, and builds a draft from the record. The draft follows the path of the
 //! source until it has to leave it: at a decision that is forbidden, at a place from which on all is decided again, or where the
 //! source contradicts itself because two of its vertices were folded onto each other. From there on decisions look ahead, until the
-//! draft is where the source is. When a part of the source was removed, its path is decoded first. A draft that is better than the worst hypothesis becomes one.
+//! draft is where the source is. When a part of the source was removed, its path is decoded first. A draft that is better than the
+//! worst hypothesis becomes one.
 
 use super::OrderedFilter;
 use super::choice::{ReportedExit, UNSEEN};
@@ -20,7 +21,7 @@ use rand_xoshiro::Xoshiro128PlusPlus;
 /// Vertices are not considered for a fold when labels and ways speak against it by more than this, in nats.
 const UNFIT: f32 = -14.0;
 
-/// How many folds are looked at before one is made.
+/// The number of folds that are compared before one is made.
 const FOLDS: usize = 8;
 
 /// The work of one step: one unit follows the source by a place.
@@ -105,9 +106,10 @@ impl Repair {
 
 impl<const N: usize, const V: usize, const D: usize, const T: usize> OrderedFilter<N, V, D, T> {
     /// Runs one refinement step: a repair, or a part of one that is too long for a step. The next [`OrderedFilter::observe`]
-    /// takes what comes out.
+    /// uses the result.
     ///
-    /// Cost: at most `WORK` places or `WORK / DECISION` decisions, or the arrivals of a part of a decoding; the choice of a fold is O(V² + D²).
+    /// Cost: at most `WORK` places or `WORK / DECISION` decisions, or the arrivals of a part of a decoding; the choice of a fold is
+    /// O(V² + D²).
     pub(super) fn repair(&mut self) {
         if self.record.len() < 3 {
             return;

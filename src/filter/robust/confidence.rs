@@ -1,12 +1,12 @@
 //! How probable it is that the best map is right.
 //!
-//! The scores of the hypotheses do not suffice: the model is an approximation, and the search may have missed the right map. If it
-//! has not, then it finds the same map again: folds start from the history, and each new place may lead to a better map.
+//! The scores of the hypotheses do not suffice: the model is an approximation, and the search may have missed the right map. A search
+//! that has found it finds it again: folds start from the history, and each new place may lead to a better map.
 
 use super::beam::Beam;
 use crate::filter::beam::Ranked as _;
 
-/// The difference of two scores counts for this share of it, because the model is an approximation.
+/// This share of the difference of two scores counts, because the model is an approximation.
 const SCORE_SHARE: f32 = 0.5;
 
 /// The weight of maps that no search finds, relative to that of the best one.
@@ -19,7 +19,7 @@ const EVEN_PLACES: f32 = 65.0;
 const PLACES_POWER: f32 = 0.7;
 const FOLDS_POWER: f32 = 0.5;
 
-/// How the best map has stood since a refinement step found it.
+/// The evidence for the best map since a refinement step found it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Trials {
     /// The places observed since then.

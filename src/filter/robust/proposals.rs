@@ -66,7 +66,7 @@ impl<const V: usize, const T: usize> Proposals<'_, V, T> {
         changed && self.finish(hypothesis)
     }
 
-    /// Follows from a path that was changed, and decodes it. Returns whether the result is to be kept if its score is high enough.
+    /// Computes what follows from a changed path, and decodes it. Returns whether the result is to be kept if its score is high enough.
     pub(super) fn finish(&mut self, hypothesis: &mut Hypothesis<V, T>) -> bool {
         // The bound of the other paths stays until it is updated.
         hypothesis.rebuild(self.model, self.history);

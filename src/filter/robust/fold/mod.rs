@@ -1,9 +1,9 @@
 //! Folding: a map from the history alone, without the map that the search is stuck in.
 //!
 //! A stuck map is a quotient of the right one: connected parts of the building lie on top of each other, and no single split undoes
-//! that. So a fold starts from the other end. The tree of the history has a node for each way to a place. Nodes are merged, and
-//! with them their neighbours that look alike, as in the state merging of automata (Lang, Pearlmutter and Price, "Results of the
-//! Abbadingo One DFA Learning Competition", ICGI 1998), each time the two whose merge has the largest gain in evidence.
+//! that. So a fold starts from the tree of the history, which has a node for each way to a place. Two nodes are merged, and with
+//! them their neighbours that look alike, as in the state merging of automata (Lang, Pearlmutter and Price, "Results of the
+//! Abbadingo One DFA Learning Competition", ICGI 1998). The next merge is always that with the largest gain in evidence.
 
 mod automaton;
 mod categories;
@@ -20,20 +20,20 @@ use categories::{Categories, Category};
 use rand_core::Rng;
 use rand_xoshiro::Xoshiro128PlusPlus;
 
-/// What a label gains that leads to a node that is there already, in nats.
+/// The gain of a label that leads to an existing node, in nats.
 const KNOWN_WAY: f32 = 4.0;
 
-/// What a step does, in units of the test of one pair, and what a merge of two nodes counts for.
+/// The work of a step in units of the test of one pair, and that of a merge of two nodes.
 const STEP_WORK: u32 = 60_000;
 const MERGE_WORK: u32 = 40;
 
-/// The tree goes on growing when merges have left this many nodes.
+/// The tree grows again when merges have left at most this many nodes.
 const NODES_LEFT: u8 = 96;
 
-/// Folds differ, so that not all fail in the same way. Within how many standard deviations of the noise labels are of one
+/// Folds differ, so that not all fail in the same way. Labels within this many standard deviations of the noise are of one
 /// category.
 const REACHES: [f32; 3] = [1.5, 2.0, 2.5];
-/// What a label gains that has the category it has on the map of the hypothesis, in nats.
+/// The gain of a label whose category is that of the map of the hypothesis, in nats.
 const INCUMBENTS: [f32; 3] = [4.0, 8.0, 1000.0];
 /// The noise of a fold that starts from the labels alone, as a share of that of the model. Where the search is stuck in a map that folds
 /// places with other labels onto each other, the noise that follows from this map is too large.
@@ -61,7 +61,7 @@ pub(crate) struct Fold<const T: usize> {
     nodes: [u8; T],
     placed: usize,
     known: usize,
-    /// What a label gains that has the category it had before, in nats.
+    /// The gain of a label whose category is that of the map of the hypothesis, in nats.
     incumbent: f32,
     /// The pair that is tried next.
     pair: (Node, Node),
@@ -69,7 +69,7 @@ pub(crate) struct Fold<const T: usize> {
     best: Option<(f32, Node, Node)>,
 }
 
-/// What a step of a fold came to.
+/// The result of a step of a fold.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Progress {
     Running,
