@@ -51,7 +51,7 @@ impl CameBy {
         is_on_edge: bool,
     ) {
         let came_by_mrad = rotated(self.bearing_mrad, rotation_mrad);
-        self.bearing_mrad = scan.heard_way(came_by_mrad, obstacles).unwrap_or(came_by_mrad);
+        self.bearing_mrad = scan.measured_way(came_by_mrad, obstacles).unwrap_or(came_by_mrad);
         if !is_on_edge {
             return;
         }

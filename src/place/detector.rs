@@ -85,7 +85,7 @@ pub struct PlaceDetector<const SONARS: usize> {
     /// The newest frame, smoothed.
     smooth_mm: [u16; SONARS],
     /// Its obstacles, as the sonars measure them.
-    heard: Obstacles,
+    measured: Obstacles,
     frame_index: u32,
     rotation: RotationEstimate,
     /// The rotation of all bearings since the start, −3142 to 3142.
@@ -120,7 +120,7 @@ impl<const SONARS: usize> PlaceDetector<SONARS> {
             plausibility: Plausibility::new(),
             smoother: RangeSmoother::new(),
             smooth_mm: [DEAD_MM; SONARS],
-            heard: Obstacles::NONE,
+            measured: Obstacles::NONE,
             frame_index: 0,
             rotation: RotationEstimate::new(),
             turned_mrad: 0,
@@ -161,7 +161,7 @@ impl<const SONARS: usize> PlaceDetector<SONARS> {
         }
         self.is_started = true;
         self.smooth_mm = [DEAD_MM; SONARS];
-        self.heard = Obstacles::NONE;
+        self.measured = Obstacles::NONE;
         self.plausibility.clear();
         self.smoother.clear();
         self.frame_index = 0;
@@ -206,19 +206,19 @@ impl<const SONARS: usize> PlaceDetector<SONARS> {
             self.faults.record(FaultKind::RingBlind);
             return None;
         }
-        let heard = self.scan().heard_obstacles();
-        self.heard = heard;
+        let measured = self.scan().measured_obstacles();
+        self.measured = measured;
         self.rotation.update(&self.smooth_mm, &self.geometry);
         self.turned_mrad = rotated(self.turned_mrad, self.rotation.rotation_mrad());
         let is_on_edge = !self.is_at_place && self.sightings == 0;
         let mut came_by = self.came_by;
-        came_by.track(&self.scan(), &heard, self.rotation.rotation_mrad(), is_on_edge);
+        came_by.track(&self.scan(), &measured, self.rotation.rotation_mrad(), is_on_edge);
         self.came_by = came_by;
         if self.is_at_place {
-            self.wait_for_departure(heard.spread_mm().unwrap_or(u16::MAX));
+            self.wait_for_departure(measured.spread_mm().unwrap_or(u16::MAX));
             return None;
         }
-        let obstacles = self.scan().beside_way(heard);
+        let obstacles = self.scan().beside_way(measured);
         let meet_point = self.scan().meet_point(&obstacles);
         self.confirm(Sighting { meet_point, frame_index, turned_mrad: self.turned_mrad }, &obstacles)
     }
@@ -236,7 +236,7 @@ impl<const SONARS: usize> PlaceDetector<SONARS> {
 
     /// The obstacles of the newest frame, as those of its [`scan`](Self::scan), without a search.
     pub(crate) fn obstacles(&self) -> Obstacles {
-        self.scan().beside_way(self.heard)
+        self.scan().beside_way(self.measured)
     }
 
     /// Change of all bearings between the two newest frames in milliradians, counter-clockwise positive: the negative of the

@@ -89,17 +89,17 @@ impl<const SONARS: usize> RingScan<'_, SONARS> {
     ///
     /// Time `O(SONARS)` for each of at most six obstacles; up to `O(SONARS²)` where most sensors are dead.
     pub fn obstacles(&self) -> Obstacles {
-        self.beside_way(self.heard_obstacles())
+        self.beside_way(self.measured_obstacles())
     }
 
     /// Counts an obstacle in the way by which the robot came as the two obstacles beside it.
     #[inline(never)]
-    pub(super) fn beside_way(&self, heard: Obstacles) -> Obstacles {
-        let Some(came_by_mrad) = self.came_by_mrad else { return heard };
-        let mut obstacles = heard;
+    pub(super) fn beside_way(&self, measured: Obstacles) -> Obstacles {
+        let Some(came_by_mrad) = self.came_by_mrad else { return measured };
+        let mut obstacles = measured;
         obstacles.split(came_by_mrad);
-        if obstacles.equidistant == heard.equidistant || self.heard_way(came_by_mrad, &heard).is_some() {
-            return heard;
+        if obstacles.equidistant == measured.equidistant || self.measured_way(came_by_mrad, &measured).is_some() {
+            return measured;
         }
         if self.is_joined(came_by_mrad, &obstacles) {
             obstacles.spread_mm = obstacles.third_spread_mm();
@@ -108,8 +108,8 @@ impl<const SONARS: usize> RingScan<'_, SONARS> {
     }
 
     /// The opening that the sonars show where a way must be. The obstacle beside it is then none that hides the way.
-    pub(super) fn heard_way(&self, way_mrad: i16, heard: &Obstacles) -> Option<i16> {
-        let openings = Self { came_by_mrad: None, ..*self }.openings(heard);
+    pub(super) fn measured_way(&self, way_mrad: i16, measured: &Obstacles) -> Option<i16> {
+        let openings = Self { came_by_mrad: None, ..*self }.openings(measured);
         openings.nearest(way_mrad, SAME_WAY_MRAD).map(|(_, opening_mrad)| opening_mrad)
     }
 
@@ -122,7 +122,7 @@ impl<const SONARS: usize> RingScan<'_, SONARS> {
 
     /// The closest obstacles as the sonars measure them.
     #[inline(never)]
-    pub(super) fn heard_obstacles(&self) -> Obstacles {
+    pub(super) fn measured_obstacles(&self) -> Obstacles {
         let mut obstacles = self.closest(|index, bearing_mrad, found| self.is_apart(index, bearing_mrad, found));
         let gap = |one: &Obstacle| {
             let turns = obstacles.equidistant().map(|other| turn_mrad(one.bearing_mrad, other.bearing_mrad));
@@ -331,9 +331,9 @@ mod tests {
     }
 
     /// The ranges of a ring of 16 by sensor, counter-clockwise from straight ahead; the others are silent.
-    fn ranges(heard_mm: &[(usize, u16)]) -> [u16; 16] {
+    fn ranges(measured_mm: &[(usize, u16)]) -> [u16; 16] {
         let mut ranges_mm = [SILENT_MM; 16];
-        heard_mm.iter().for_each(|&(sensor, range_mm)| ranges_mm[sensor] = range_mm);
+        measured_mm.iter().for_each(|&(sensor, range_mm)| ranges_mm[sensor] = range_mm);
         ranges_mm
     }
 
