@@ -6,21 +6,22 @@ use embassy_sync::{blocking_mutex::raw::CriticalSectionRawMutex, signal::Signal}
 use embassy_time::{Duration, Instant, Timer, block_for, with_timeout};
 use toposlam::{
     FaultCounters,
-    ring::{Echo, RingFrame, drivers::SonarFault},
+    ring::{
+        Echo, RingFrame,
+        drivers::{HcSr04Config, SonarFault},
+    },
 };
 
 use crate::SONARS;
 
 /// Sensors that fire together are opposite each other: four pairs, one after the other.
 const PAIRS: usize = SONARS / 2;
-/// The times and limits of `HcSr04Config::DEFAULT`.
-const TRIGGER: Duration = Duration::from_micros(12);
-const RISE_TIMEOUT: Duration = Duration::from_micros(5000);
-const ECHO_TIMEOUT: Duration = Duration::from_micros(40_000);
-const CYCLE: Duration = Duration::from_millis(60);
-const SPEED_OF_SOUND_M_PER_S: u64 = 343;
-const MIN_RANGE_MM: u16 = 20;
-const MAX_RANGE_MM: u16 = 4000;
+/// The times and limits of the sensors.
+const CONFIG: HcSr04Config<SONARS> = HcSr04Config::DEFAULT;
+const TRIGGER: Duration = Duration::from_micros(CONFIG.trigger_us as u64);
+const RISE_TIMEOUT: Duration = Duration::from_micros(CONFIG.rise_timeout_us as u64);
+const ECHO_TIMEOUT: Duration = Duration::from_micros(CONFIG.echo_timeout_us as u64);
+const CYCLE: Duration = Duration::from_millis(CONFIG.cycle_ms as u64);
 
 /// The newest frame, with the faults since the start. The main loop waits for it; a frame that it did not take is replaced.
 pub(crate) static FRAMES: Signal<CriticalSectionRawMutex, (RingFrame<SONARS>, FaultCounters)> = Signal::new();
@@ -49,12 +50,7 @@ impl Sonar {
         if with_timeout(ECHO_TIMEOUT, self.echo.wait_for_low()).await.is_err() {
             return Ok(Echo::Silence);
         }
-        let range_mm = (rise.elapsed().as_micros() * SPEED_OF_SOUND_M_PER_S + 1000) / 2000;
-        match u16::try_from(range_mm) {
-            Ok(0..MIN_RANGE_MM) => Err(SonarFault::OutOfRange),
-            Ok(range_mm @ MIN_RANGE_MM..=MAX_RANGE_MM) => Ok(Echo::Range { range_mm }),
-            _ => Ok(Echo::Silence),
-        }
+        CONFIG.echo(rise.elapsed().as_micros() as u32)
     }
 }
 

@@ -190,6 +190,7 @@ fn tof_ring(bus: impl I2c) {
 fn pin_ring() {
     let pins = core::array::from_fn(|_| (AnyPin, AnyPin));
     let config = HcSr04Config::default().with_plan(any_plan());
+    black_box(config.opaque().echo(black_box(5)).is_ok());
     match HcSr04Ring::<_, _, _, _, 16>::new(pins, AnyClock, AnyDelay, config.opaque()) {
         Ok(mut ring) => {
             read(&mut ring);

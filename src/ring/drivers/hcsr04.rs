@@ -90,8 +90,11 @@ impl<const SONARS: usize> HcSr04Config<SONARS> {
         ConfigError::check("echo_timeout_us", self.echo_timeout_us.into(), flight_us, most)
     }
 
-    /// Converts the width of a pulse to an echo.
-    fn echo(&self, pulse_us: u32) -> Result<Echo, SonarFault> {
+    /// Converts the width of a pulse on the echo line to an echo; also for a ring that times the pulses with interrupts.
+    ///
+    /// # Errors
+    /// [`SonarFault::OutOfRange`] below the minimum range.
+    pub fn echo(&self, pulse_us: u32) -> Result<Echo, SonarFault> {
         match u16::try_from(range_mm(pulse_us, self.speed_of_sound_m_per_s)) {
             Ok(range_mm) if range_mm < self.min_range_mm => Err(SonarFault::OutOfRange),
             Ok(range_mm) if range_mm <= self.max_range_mm => Ok(Echo::Range { range_mm }),
