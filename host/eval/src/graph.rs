@@ -64,12 +64,13 @@ impl Graph {
 
     /// Whether the two graphs are isomorphic, regardless of labels.
     pub fn is_isomorphic_to(&self, other: &Self) -> bool {
-        is_isomorphic(&self.to_petgraph(), &other.to_petgraph())
+        is_isomorphic(&self.to_petgraph(|_| ()), &other.to_petgraph(|_| ()))
     }
 
-    fn to_petgraph(&self) -> petgraph::Graph<(), (), Undirected> {
+    /// The same graph for the algorithms of petgraph, each vertex with a label.
+    pub(crate) fn to_petgraph<L>(&self, label: impl Fn(usize) -> L) -> petgraph::Graph<L, (), Undirected> {
         let mut graph = petgraph::Graph::with_capacity(self.vertex_count, self.edges.len());
-        let vertices: Vec<_> = (0..self.vertex_count).map(|_| graph.add_node(())).collect();
+        let vertices: Vec<_> = (0..self.vertex_count).map(|vertex| graph.add_node(label(vertex))).collect();
         for &(a, b) in &self.edges {
             graph.add_edge(vertices[a], vertices[b], ());
         }

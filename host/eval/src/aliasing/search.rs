@@ -1,14 +1,13 @@
 //! The exact search for the smallest maps that explain a walk and have the n-grams of an environment.
 
 use crate::graph::Graph;
-use petgraph::{Undirected, algo::is_isomorphic_matching};
+use petgraph::algo::is_isomorphic_matching;
 use std::collections::BTreeSet;
-
-/// Labels are below this.
-pub(super) const LABELS: u8 = 64;
 
 /// How many bits of an n-gram a label takes.
 const LABEL_BITS: u32 = 6;
+/// Labels are below this.
+const LABELS: u8 = 1 << LABEL_BITS;
 
 /// A graph whose vertices have labels.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -20,15 +19,7 @@ pub(super) struct LabelledGraph {
 impl LabelledGraph {
     /// The label strings of all walks of `length` places.
     pub(super) fn ngrams(&self, length: usize) -> BTreeSet<u64> {
-        let neighbours = self.graph.neighbours();
-        let mut walks: BTreeSet<(usize, u64)> = (0..self.labels.len()).map(|at| (at, self.labels[at].into())).collect();
-        for _ in 1..length {
-            let next = |&(at, ngram): &(usize, u64)| {
-                neighbours[at].iter().map(move |&next| (next, appended(ngram, self.labels[next])))
-            };
-            walks = walks.iter().flat_map(next).collect();
-        }
-        walks.into_iter().map(|(_, ngram)| ngram).collect()
+        strings(&self.labels, &self.graph.neighbours(), 0..self.labels.len(), length, false)
     }
 
     /// Whether two graphs have walks with the same labels, of any length. Follows the sets of places that a walk may have reached.
@@ -69,20 +60,32 @@ impl LabelledGraph {
 
     /// Whether two graphs are isomorphic, labels included.
     pub(super) fn is_isomorphic_to(&self, other: &Self) -> bool {
-        let [one, other] = [self, other].map(|graph| {
-            let mut labelled = petgraph::Graph::<u8, (), Undirected>::with_capacity(graph.labels.len(), 0);
-            let vertices: Vec<_> = graph.labels.iter().map(|&label| labelled.add_node(label)).collect();
-            for &(a, b) in graph.graph.edges() {
-                labelled.add_edge(vertices[a], vertices[b], ());
-            }
-            labelled
-        });
+        let [one, other] = [self, other].map(|graph| graph.graph.to_petgraph(|vertex| graph.labels[vertex]));
         is_isomorphic_matching(&one, &other, |a, b| a == b, |(), ()| true)
     }
 }
 
-fn appended(ngram: u64, label: u8) -> u64 {
-    ngram << LABEL_BITS | u64::from(label)
+/// The label strings of all walks of `length` places from these starts, read from the far end if `reversed`.
+fn strings(
+    labels: &[u8],
+    neighbours: &[Vec<usize>],
+    starts: impl IntoIterator<Item = usize>,
+    length: usize,
+    reversed: bool,
+) -> BTreeSet<u64> {
+    let mut walks: BTreeSet<(usize, u64)> = starts.into_iter().map(|at| (at, labels[at].into())).collect();
+    for step in 1..length {
+        let next = |&(at, string): &(usize, u64)| {
+            neighbours[at].iter().map(move |&next| {
+                let label = u64::from(labels[next]);
+                let longer =
+                    if reversed { string | label << (LABEL_BITS * step as u32) } else { string << LABEL_BITS | label };
+                (next, longer)
+            })
+        };
+        walks = walks.iter().flat_map(next).collect();
+    }
+    walks.into_iter().map(|(_, string)| string).collect()
 }
 
 /// What a search found.
@@ -176,22 +179,7 @@ impl Map {
 
     /// The label strings of all walks of `length` places from a vertex, read from the far end if `reversed`.
     fn strings(&self, from: usize, length: usize, reversed: bool) -> BTreeSet<u64> {
-        let mut walks = BTreeSet::from([(from, u64::from(self.labels[from]))]);
-        for step in 1..length {
-            let next = |&(at, string): &(usize, u64)| {
-                self.neighbours[at].iter().map(move |&next| {
-                    let label = self.labels[next];
-                    let longer = if reversed {
-                        string | u64::from(label) << (LABEL_BITS * step as u32)
-                    } else {
-                        appended(string, label)
-                    };
-                    (next, longer)
-                })
-            };
-            walks = walks.iter().flat_map(next).collect();
-        }
-        walks.into_iter().map(|(_, string)| string).collect()
+        strings(&self.labels, &self.neighbours, [from], length, reversed)
     }
 
     fn finished(&self) -> LabelledGraph {
@@ -212,7 +200,7 @@ struct Search<'a> {
 }
 
 impl Search<'_> {
-    /// Searches from the start of the walk. Returns whether all maps were seen.
+    /// Searches from the start of the walk. Returns `false` when the search reached its limit.
     fn start(&mut self) -> bool {
         self.map = Map::default();
         let Some((&first, rest)) = self.walk.split_first() else { return true };
@@ -220,38 +208,39 @@ impl Search<'_> {
         self.extend(rest, at)
     }
 
-    /// Explains the rest of the walk from a vertex. Returns whether to go on.
+    /// Explains the rest of the walk from a vertex. Returns `false` when the search reached its limit.
     fn extend(&mut self, rest: &[u8], at: usize) -> bool {
         if self.nodes_left == 0 {
             return false;
         }
         self.nodes_left -= 1;
-        let Some((&label, rest)) = rest.split_first() else { return self.finish() };
-        let fitting: Vec<usize> =
-            (0..self.map.labels.len()).filter(|&vertex| self.map.labels[vertex] == label).collect();
-        let is_edge = |map: &Map, vertex: &usize| map.neighbours[at].contains(vertex);
-        for &next in fitting.iter().filter(|vertex| is_edge(&self.map, vertex)).collect::<Vec<_>>() {
-            if !self.extend(rest, next) {
-                return false;
-            }
+        let Some((&label, rest)) = rest.split_first() else {
+            self.finish();
+            return true;
+        };
+        let (neighbours, others): (Vec<usize>, Vec<usize>) = (0..self.map.labels.len())
+            .filter(|&vertex| self.map.labels[vertex] == label)
+            .partition(|vertex| self.map.neighbours[at].contains(vertex));
+        if !neighbours.into_iter().all(|next| self.extend(rest, next))
+            || !others.into_iter().all(|next| self.extend_over_new_edge(rest, at, next))
+        {
+            return false;
         }
-        for &next in fitting.iter().filter(|vertex| !is_edge(&self.map, vertex)).collect::<Vec<_>>() {
-            self.map.add_edge(at, next);
-            let goes_on = !self.is_possible(at, next) || self.extend(rest, next);
-            self.map.remove_edge(at, next);
-            if !goes_on {
-                return false;
-            }
+        if self.map.labels.len() == self.most_vertices {
+            return true;
         }
-        if self.map.labels.len() < self.most_vertices {
-            let next = self.map.add_vertex(label);
-            self.map.add_edge(at, next);
-            let goes_on = !self.is_possible(at, next) || self.extend(rest, next);
-            self.map.remove_edge(at, next);
-            self.map.remove_last_vertex();
-            return goes_on;
-        }
-        true
+        let next = self.map.add_vertex(label);
+        let is_complete = self.extend_over_new_edge(rest, at, next);
+        self.map.remove_last_vertex();
+        is_complete
+    }
+
+    /// Adds an edge, explains the rest of the walk from its end if the map is still possible, and removes the edge.
+    fn extend_over_new_edge(&mut self, rest: &[u8], at: usize, next: usize) -> bool {
+        self.map.add_edge(at, next);
+        let is_complete = !self.is_possible(at, next) || self.extend(rest, next);
+        self.map.remove_edge(at, next);
+        is_complete
     }
 
     /// Whether the environment has all n-grams that lead over an edge, and no map with fewer edges is known.
@@ -270,7 +259,7 @@ impl Search<'_> {
     }
 
     /// Takes a map that explains the walk, if it has all n-grams.
-    fn finish(&mut self) -> bool {
+    fn finish(&mut self) {
         let map = self.map.finished();
         if map.ngrams(self.length) == *self.ngrams {
             let fewest = self.found.first().map(|known| known.graph.edges().len());
@@ -281,7 +270,6 @@ impl Search<'_> {
                 self.found.push(map);
             }
         }
-        true
     }
 }
 
@@ -296,7 +284,7 @@ mod tests {
     #[test]
     fn n_grams_are_the_label_strings_of_all_walks() {
         let path = labelled(&[1, 2, 3], &[(0, 1), (1, 2)]);
-        let string = |labels: &[u8]| labels.iter().fold(0, |string, &label| appended(string, label));
+        let string = |labels: &[u8]| labels.iter().fold(0, |string, &label| string << LABEL_BITS | u64::from(label));
         let expected = [[1, 2, 1], [1, 2, 3], [2, 1, 2], [2, 3, 2], [3, 2, 1], [3, 2, 3]];
         assert_eq!(path.ngrams(3), expected.iter().map(|labels| string(labels)).collect());
     }
