@@ -1,7 +1,7 @@
 //! Histograms of two filters side by side, as SVG: the paper's Fig. 4 and 5.
 
 use super::report::{BIN_MM, Row};
-use crate::chart::{self, FAINT, INK, line, words};
+use crate::chart::{self, INK, colour, line, scale, words};
 use std::collections::{BTreeMap, BTreeSet};
 use svg::node::element::{Group, Rectangle};
 
@@ -23,7 +23,6 @@ pub struct Pair<'a> {
     pub places: Option<usize>,
 }
 
-const COLOURS: [&str; 2] = ["#1f6f8b", "#b3261e"];
 const PANEL: (f64, f64) = (420.0, 220.0);
 /// Margins of a panel: left for the shares, above for the name, below for the axis.
 const LEFT: f64 = 66.0;
@@ -119,12 +118,9 @@ fn panel(quantity: Quantity, row: &Row, axes: &Axes, places: Option<usize>, side
     let filter = if row.filter == "paper" { "paper's" } else { row.filter };
     let exact = format!("{filter} filter: {:.1} % exact", 100.0 * row.exact);
     let mut panel =
-        Group::new().add(words(&exact, 0.0, -14.0, 14.0).set("fill", COLOURS[side]).set("font-weight", "bold"));
+        Group::new().add(words(&exact, 0.0, -14.0, 14.0).set("fill", colour(side)).set("font-weight", "bold"));
     for percent in (0..=axes.top_percent).step_by(share_step(axes.top_percent as f64)) {
-        let at = y(percent as f64);
-        panel = panel
-            .add(line((0.0, at), (width, at), FAINT))
-            .add(words(&format!("{percent} %"), -8.0, at + 4.0, 12.0).set("text-anchor", "end"));
+        panel = scale(panel, width, &format!("{percent} %"), y(percent as f64));
     }
     let counts = counts(quantity, row);
     for (slot, bin) in axes.bins.iter().enumerate() {
@@ -132,7 +128,7 @@ fn panel(quantity: Quantity, row: &Row, axes: &Axes, places: Option<usize>, side
         if let Some(&maps) = counts.get(bin) {
             let top = y(100.0 * maps as f64 / row.paths as f64);
             let bar = Rectangle::new().set("x", left + 0.08 * bin_width).set("y", top).set("width", 0.84 * bin_width);
-            panel = panel.add(bar.set("height", height - top).set("fill", COLOURS[side]));
+            panel = panel.add(bar.set("height", height - top).set("fill", colour(side)));
         }
     }
     panel = panel.add(line((0.0, height), (width, height), INK));
@@ -217,7 +213,7 @@ mod tests {
         for (quantity, words) in [(Quantity::Vertices, "11 places"), (Quantity::Consistency, "∞")] {
             let picture = draw(quantity, &pairs);
             let bars = |colour| picture.split("<rect").filter(|rest| rest.contains(&format!("\"{colour}\""))).count();
-            assert!(bars(COLOURS[0]) >= 2 && bars(COLOURS[1]) >= 2, "{picture}");
+            assert!(bars(colour(0)) >= 2 && bars(colour(1)) >= 2, "{picture}");
             assert!(picture.contains(words) && picture.contains("50.0 % exact") && picture.contains("a &lt; b"));
         }
     }

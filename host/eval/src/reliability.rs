@@ -1,7 +1,7 @@
 //! How far the probability of a map can be believed: among maps of a stated probability, the share that is right, and the
 //! reliability diagram.
 
-use crate::chart::{self, FAINT, INK, line, words};
+use crate::chart::{self, INK, colour, line, scale, words};
 use serde::Serialize;
 use svg::node::element::{Circle, Group};
 
@@ -70,7 +70,6 @@ impl Reliability {
     }
 }
 
-const COLOURS: [&str; 2] = ["#1f6f8b", "#b3261e"];
 const SIDE: f64 = 320.0;
 const LEFT: f64 = 64.0;
 const ABOVE: f64 = 76.0;
@@ -85,7 +84,7 @@ pub fn draw(filters: &[(&str, Reliability)]) -> String {
         let left = LEFT + number as f64 * (SIDE + LEFT);
         let heading = format!("{name} filter: mean error {:.3}", reliability.error());
         document = document
-            .add(words(&heading, left, ABOVE - 16.0, 14.0).set("fill", COLOURS[number % COLOURS.len()]))
+            .add(words(&heading, left, ABOVE - 16.0, 14.0).set("fill", colour(number)))
             .add(panel(reliability, number).set("transform", format!("translate({left:.0} {ABOVE:.0})")));
     }
     document.to_string()
@@ -96,10 +95,9 @@ fn panel(reliability: &Reliability, number: usize) -> Group {
     let mut panel = Group::new();
     for tenth in (0..=10).step_by(2) {
         let share = f64::from(tenth) / 10.0;
-        panel = panel
-            .add(line(at(0.0, share), at(1.0, share), FAINT))
-            .add(words(&format!("{share:.1}"), -8.0, at(0.0, share).1 + 4.0, 12.0).set("text-anchor", "end"))
-            .add(words(&format!("{share:.1}"), at(share, 0.0).0, SIDE + 18.0, 12.0).set("text-anchor", "middle"));
+        let name = format!("{share:.1}");
+        panel = scale(panel, SIDE, &name, at(0.0, share).1)
+            .add(words(&name, at(share, 0.0).0, SIDE + 18.0, 12.0).set("text-anchor", "middle"));
     }
     panel = panel
         .add(line(at(0.0, 0.0), at(1.0, 1.0), INK))
@@ -111,13 +109,9 @@ fn panel(reliability: &Reliability, number: usize) -> Group {
             let (x, y) = at(stated, exact);
             let radius = 3.0 + 11.0 * (bin.maps as f64 / most).sqrt();
             let circle = Circle::new().set("cx", format!("{x:.1}")).set("cy", format!("{y:.1}"));
-            let circle = circle.set("r", format!("{radius:.1}")).set("fill", COLOURS[number % COLOURS.len()]);
-            panel = panel.add(circle.set("fill-opacity", 0.6)).add(words(
-                &bin.maps.to_string(),
-                x + radius + 3.0,
-                y + 4.0,
-                11.0,
-            ));
+            let circle = circle.set("r", format!("{radius:.1}")).set("fill", colour(number));
+            let count = words(&bin.maps.to_string(), x + radius + 3.0, y + 4.0, 11.0);
+            panel = panel.add(circle.set("fill-opacity", 0.6)).add(count);
         }
     }
     panel

@@ -2,11 +2,10 @@
 //! that the search expands over the number of places.
 
 use super::{LENGTHS, Outcome, Report, Row};
-use crate::chart::{self, FAINT, INK, line, vertical_axis, words};
+use crate::chart::{self, INK, colour, line, scale, words};
 use std::collections::BTreeSet;
 use svg::node::element::{Circle, Group, Path, path::Data};
 
-const COLOURS: [&str; 6] = ["#1f6f8b", "#b3261e", "#6a8f2f", "#8b5fbf", "#c77d11", "#4d4d4d"];
 const PANEL: (f64, f64) = (300.0, 220.0);
 const LEFT: f64 = 62.0;
 const GAP: f64 = 70.0;
@@ -52,24 +51,15 @@ fn lengths(rows: &[&Row], sizes: &[usize]) -> Group {
     let mut panel = Group::new();
     for length in least..=most + 1 {
         let name = if length > most { format!("> {most}") } else { length.to_string() };
-        let at = y((length - least) as f64);
-        panel = panel
-            .add(line((0.0, at), (width, at), FAINT))
-            .add(words(&name, -8.0, at + 4.0, 12.0).set("text-anchor", "end"));
+        panel = scale(panel, width, &name, y((length - least) as f64));
     }
     for row in rows {
         let number = sizes.iter().position(|&size| size == row.places).unwrap_or(0);
         // The sizes lie beside each other.
         let offset = 0.7 * ((number as f64 + 0.5) / sizes.len() as f64 - 0.5);
         for Outcome { aliased, length, .. } in &row.results {
-            let line = length.map_or(most + 1, |length| length) - least;
-            let circle = Circle::new().set("cx", format!("{:.1}", width * aliased)).set("r", 2.4);
-            panel = panel.add(
-                circle
-                    .set("cy", format!("{:.1}", y(line as f64 + offset)))
-                    .set("fill", colour(number))
-                    .set("fill-opacity", 0.55),
-            );
+            let line = length.unwrap_or(most + 1) - least;
+            panel = panel.add(point(width * aliased, y(line as f64 + offset), number));
         }
     }
     for percent in [0, 25, 50, 75, 100] {
@@ -78,10 +68,7 @@ fn lengths(rows: &[&Row], sizes: &[usize]) -> Group {
             .add(line((at, height), (at, height + 5.0), INK))
             .add(words(&format!("{percent} %"), at, height + 19.0, 12.0).set("text-anchor", "middle"));
     }
-    panel
-        .add(line((0.0, height), (width, height), INK))
-        .add(words("aliased places", width / 2.0, height + 37.0, 13.0).set("text-anchor", "middle"))
-        .add(vertical_axis("n that suffices", height))
+    with_axes(panel, "aliased places", "n that suffices")
 }
 
 /// The expanded nodes over the number of places, and their median.
@@ -91,10 +78,7 @@ fn nodes(rows: &[&Row], sizes: &[usize]) -> Group {
     let x = |number: usize| width * (number as f64 + 0.5) / sizes.len() as f64;
     let mut panel = Group::new();
     for (decade, name) in (0..).zip(DECADES) {
-        let at = y(10_u64.pow(decade));
-        panel = panel
-            .add(line((0.0, at), (width, at), FAINT))
-            .add(words(name, -8.0, at + 4.0, 12.0).set("text-anchor", "end"));
+        panel = scale(panel, width, name, y(10_u64.pow(decade)));
     }
     let mut medians = Vec::new();
     for row in rows {
@@ -103,9 +87,7 @@ fn nodes(rows: &[&Row], sizes: &[usize]) -> Group {
         nodes.sort_unstable();
         for (rank, &nodes) in nodes.iter().enumerate() {
             let offset = 0.5 * width / sizes.len() as f64 * ((rank as f64 + 0.5) / row.results.len() as f64 - 0.5);
-            let circle =
-                Circle::new().set("cx", format!("{:.1}", x(number) + offset)).set("cy", format!("{:.1}", y(nodes)));
-            panel = panel.add(circle.set("r", 2.4).set("fill", colour(number)).set("fill-opacity", 0.55));
+            panel = panel.add(point(x(number) + offset, y(nodes), number));
         }
         medians.extend(nodes.get(nodes.len() / 2).map(|&median| (x(number), y(median))));
         let name = words(&row.places.to_string(), x(number), height + 19.0, 12.0);
@@ -115,14 +97,26 @@ fn nodes(rows: &[&Row], sizes: &[usize]) -> Group {
         let data = rest.iter().fold(Data::new().move_to(first), |data, &point| data.line_to(point));
         panel = panel.add(Path::new().set("d", data).set("fill", "none").set("stroke", INK).set("stroke-width", 1.5));
     }
-    panel
-        .add(line((0.0, height), (width, height), INK))
-        .add(words("places", width / 2.0, height + 37.0, 13.0).set("text-anchor", "middle"))
-        .add(vertical_axis("nodes of the search", height))
+    with_axes(panel, "places", "nodes of the search")
 }
 
-fn colour(number: usize) -> &'static str {
-    COLOURS[number % COLOURS.len()]
+/// The point of an environment.
+fn point(x: f64, y: f64, size: usize) -> Circle {
+    Circle::new()
+        .set("cx", format!("{x:.1}"))
+        .set("cy", format!("{y:.1}"))
+        .set("r", 2.4)
+        .set("fill", colour(size))
+        .set("fill-opacity", 0.55)
+}
+
+/// A panel with its axes and their names.
+fn with_axes(panel: Group, horizontal: &str, vertical: &str) -> Group {
+    let (width, height) = PANEL;
+    panel
+        .add(line((0.0, height), (width, height), INK))
+        .add(words(horizontal, width / 2.0, height + 37.0, 13.0).set("text-anchor", "middle"))
+        .add(words(vertical, -height / 2.0, -44.0, 13.0).set("text-anchor", "middle").set("transform", "rotate(-90)"))
 }
 
 #[cfg(test)]
