@@ -1,5 +1,5 @@
-//! How far the probability of a map can be believed: among maps of a stated probability, the share that is right, and the
-//! reliability diagram.
+//! How reliable the stated probability of a map is: among maps of one probability, the share that is exact. With the reliability
+//! diagram.
 
 use crate::chart::{self, INK, colour, line, scale, words};
 use serde::Serialize;
@@ -47,16 +47,15 @@ impl Reliability {
         reliability
     }
 
-    /// All maps of several rows.
+    /// The maps of all these reliabilities.
     pub fn sum<'a>(all: impl IntoIterator<Item = &'a Self>) -> Self {
         let mut sum = Self::default();
-        for (held, bin) in
-            all.into_iter().flat_map(|one| one.bins).enumerate().map(|(number, bin)| (number % BINS, bin))
-        {
-            let held = &mut sum.bins[held];
-            held.maps += bin.maps;
-            held.exact += bin.exact;
-            held.probability_sum += bin.probability_sum;
+        for one in all {
+            for (total, bin) in sum.bins.iter_mut().zip(&one.bins) {
+                total.maps += bin.maps;
+                total.exact += bin.exact;
+                total.probability_sum += bin.probability_sum;
+            }
         }
         sum
     }

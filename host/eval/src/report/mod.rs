@@ -325,7 +325,7 @@ fn row(case: &Case, settings: &Settings, results: &[PathResult], check_point: us
 
 impl Report {
     /// The reliability of each filter over all rows.
-    pub fn filters(&self) -> impl Iterator<Item = (&'static str, Reliability)> {
+    pub fn reliability(&self) -> impl Iterator<Item = (&'static str, Reliability)> {
         let names: BTreeSet<&'static str> = self.rows.iter().map(|row| row.filter).collect();
         names.into_iter().map(|name| {
             let rows = self.rows.iter().filter(|row| row.filter == name);

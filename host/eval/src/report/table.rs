@@ -56,7 +56,7 @@ impl fmt::Display for Report {
             row.vertices.iter().try_for_each(|(vertices, maps)| write!(f, " {vertices}:{maps}"))?;
             writeln!(f)?;
         }
-        self.filters().try_for_each(|(filter, reliability)| {
+        self.reliability().try_for_each(|(filter, reliability)| {
             write!(f, "{filter} filter: stated probability of the map, share exact (maps):")?;
             for bin in reliability.bins {
                 if let Some((stated, exact)) = bin.shares() {

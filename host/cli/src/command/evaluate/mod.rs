@@ -215,7 +215,7 @@ fn plot(directory: &Path, cases: &[Case], report: &Report, filters: &[Filter], l
         fs::write(&file, draw(quantity, &pairs)).with_context(|| file.display().to_string())?;
     }
     let file = directory.join("reliability.svg");
-    let diagrams: Vec<_> = report.filters().collect();
+    let diagrams: Vec<_> = report.reliability().collect();
     fs::write(&file, reliability::draw(&diagrams)).with_context(|| file.display().to_string())
 }
 
