@@ -90,8 +90,7 @@ fn list(plan: &Plan, truth: &TrueMap) -> anyhow::Result<()> {
         )?;
     }
     for edge in &truth.edges {
-        let length_mm: f64 = edge.way.windows(2).map(|ends| ends[0].distance_mm(ends[1])).sum();
-        outln!("edge {:3} - {:3}, {:.2} m", edge.nodes[0], edge.nodes[1], length_mm / 1000.0)?;
+        outln!("edge {:3} - {:3}, {:.2} m", edge.nodes[0], edge.nodes[1], edge.length_mm() / 1000.0)?;
     }
     let dropped = &truth.dropped;
     outln!(
