@@ -21,6 +21,9 @@ const REGISTER_PERIOD: usize = 0x006C;
 const REGISTER_INTERRUPT_CLEAR: usize = 0x0086;
 const REGISTER_MODE_START: usize = 0x0087;
 const REGISTER_RESULT: usize = 0x0089;
+const REGISTER_OSCILLATOR: usize = 0x00DE;
+const REGISTER_SYSTEM_STATUS: usize = 0x00E5;
+const REGISTER_MODEL: usize = 0x010F;
 const RESULT_BYTES: usize = 17;
 
 /// Rangers on a bus with simulated time, in reset until their [`Xshut`] is high. The world is a source of ring frames: a
@@ -55,9 +58,9 @@ impl Sensor {
     fn reset(fault: Option<SensorFault>) -> Self {
         let mut registers = vec![0; REGISTERS];
         registers[REGISTER_ADDRESS] = NEW_ADDRESS;
-        registers[0x00DE..0x00E0].copy_from_slice(&OSCILLATOR.to_be_bytes());
-        registers[0x00E5] = 3;
-        registers[0x010F..].copy_from_slice(&[0xEA, 0xCC]);
+        registers[REGISTER_OSCILLATOR..][..2].copy_from_slice(&OSCILLATOR.to_be_bytes());
+        registers[REGISTER_SYSTEM_STATUS] = 3;
+        registers[REGISTER_MODEL..].copy_from_slice(&[0xEA, 0xCC]);
         Self { fault, registers, pointer: 0, done_ns: None }
     }
 
