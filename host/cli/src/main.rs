@@ -34,7 +34,7 @@ enum Task {
     Replay(command::replay::Arguments),
     /// Measure how often maps are exact, over random paths through known environments.
     Evaluate(command::evaluate::Arguments),
-    /// Find the n-grams that tell places with equal labels apart, on random graphs without noise.
+    /// Find the n-grams that distinguish places with equal labels, on random graphs without noise.
     Aliasing(command::aliasing::Arguments),
     /// Run a simulated robot that serves its line at a TCP port.
     Robot(command::robot::Arguments),

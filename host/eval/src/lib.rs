@@ -4,7 +4,7 @@
 //! maps it, and [`settings`] the parameters. [`judge`] evaluates one path, [`run`] evaluates all paths, and [`report`]
 //! summarises the results.
 //!
-//! [`aliasing`] finds out which n-grams tell places with equal labels apart.
+//! [`aliasing`] finds the n-grams that distinguish places with equal labels.
 //!
 //! [`mapping`] maps ring frames on the host, from a simulation or from a [`range_csv`] recording of a real ring.
 //! [`gvg_adherence`] measures how closely a recorded robot followed the Voronoi graph, and [`laps`] compares the laps

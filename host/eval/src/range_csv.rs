@@ -8,7 +8,6 @@ use anyhow::{Context, bail, ensure};
 use csv::StringRecord;
 use serde::Deserialize;
 use toposlam::ring::{Echo, RingFrame, RingGeometry};
-
 use toposlam_sim::world::{Point, Pose};
 
 /// The largest ring that can be replayed. A smaller ring fills the first positions, and the others are dead.

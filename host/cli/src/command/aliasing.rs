@@ -1,4 +1,4 @@
-//! `toposlam aliasing`: which n-grams tell places with equal labels apart.
+//! `toposlam aliasing`: which n-grams distinguish places with equal labels.
 
 use anyhow::ensure;
 use clap::Args;

@@ -1,4 +1,4 @@
-//! Which n-grams tell places with equal labels apart, on random graphs without noise: the study of Werner, Maire and Sitte that the
+//! Which n-grams distinguish places with equal labels, on random graphs without noise: the study of Werner, Maire and Sitte that the
 //! paper cites as \[8\].
 //!
 //! A place is *aliased* when another place has its label. For each environment the study finds the smallest n for which the
@@ -51,7 +51,7 @@ impl fmt::Display for GraphKind {
 pub struct Study {
     /// The kinds of graphs.
     pub kinds: Vec<GraphKind>,
-    /// The numbers of places.
+    /// The numbers of places, 64 at most.
     pub places: Vec<usize>,
     /// How many environments there are of each kind and size.
     pub environments: usize,
@@ -72,13 +72,13 @@ pub struct Outcome {
     pub degree: f64,
     /// How many places walks distinguish: the vertices of the right map.
     pub distinguishable: usize,
-    /// The smallest n for which the smallest map is unique and has exactly the walks of the environment; `None` if there is none up to 7,
-    /// or the search was ended before.
+    /// The smallest n for which the smallest map is unique and has exactly the walks of the environment; `None` if there is none up to 7
+    /// that the search finds.
     pub length: Option<usize>,
-    /// Whether this map has a vertex for each place that walks distinguish. Otherwise it is smaller: no n-gram tells a place from
-    /// another one that has its label and its neighbours, and more.
+    /// Whether this map has a vertex for each place that walks distinguish. Otherwise it is smaller: no n-gram shows a place whose
+    /// neighbours are among those of another place with its label.
     pub right: bool,
-    /// Whether the search reached its limit.
+    /// Whether no n suffices and the search reached its limit for one of them.
     pub ended: bool,
     /// The nodes that the search expanded for the last n.
     pub nodes: u64,
@@ -145,7 +145,7 @@ impl Study {
                 smallest_maps(&walk, &environment.ngrams(length), length, right.labels.len(), self.most_nodes);
             result.nodes = nodes;
             match found {
-                // With longer n-grams the same map stays, and no other one comes.
+                // With longer n-grams this map stays the only smallest one.
                 Found::One(map) if map.has_same_walks(environment) => {
                     result.length = Some(length);
                     result.right = map.is_isomorphic_to(&right);
@@ -213,7 +213,7 @@ fn grid(places: usize) -> Graph {
     Graph::from_edges(places, right.chain(down))
 }
 
-/// A walk along all edges: to the nearest edge that was not driven.
+/// A walk along all edges, each time to the nearest edge that was not driven.
 fn covering_walk(graph: &Graph) -> Vec<usize> {
     let neighbours = graph.neighbours();
     let mut left: BTreeSet<(usize, usize)> = graph.edges().clone();
@@ -332,7 +332,7 @@ mod tests {
     }
 
     #[test]
-    fn a_place_whose_neighbours_another_place_of_its_label_has_too_is_never_told_apart() {
+    fn a_place_whose_neighbours_another_place_of_its_label_has_too_is_never_distinguished() {
         // A grid of two rows. Place 0 has two of the three neighbours of place 4.
         let found = result(&[0, 1, 2, 3, 0, 4], grid(6));
         assert_eq!((found.distinguishable, found.right), (6, false));
