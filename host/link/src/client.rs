@@ -138,13 +138,17 @@ impl<L: Read + Write, F: FnMut(&Listener, Event<'_>)> Client<L, F> {
         Ok(Modes { localise_only: self.info()?.localise_only, settings: self.settings()? })
     }
 
-    /// Restores a snapshot as [`Client::restore`]. Returns what it changes beside the map, in words; with `keep_settings`
+    /// Restores a snapshot as [`Client::restore`]. Returns in words what it changes of the modes `before`; with `keep_settings`
     /// these changes are reverted.
     ///
     /// # Errors
     /// As [`Client::modes`] and [`Client::restore`].
-    pub fn restore_and_compare(&mut self, snapshot: &[u8], keep_settings: bool) -> Result<Vec<String>, ClientError> {
-        let before = self.modes()?;
+    pub fn restore_and_compare(
+        &mut self,
+        snapshot: &[u8],
+        before: &Modes,
+        keep_settings: bool,
+    ) -> Result<Vec<String>, ClientError> {
         self.restore(snapshot)?;
         let after = self.modes()?;
         let changes = before.changes(&after);

@@ -364,8 +364,8 @@ fn perform(
         Task::Restore(file) => {
             let snapshot = std::fs::read(file)?;
             let changes = match client.modes() {
-                Ok(_) => Some(client.restore_and_compare(&snapshot, false)?),
-                Err(ClientError::Line(error)) => return Err(ClientError::Line(error).into()),
+                Ok(before) => Some(client.restore_and_compare(&snapshot, &before, false)?),
+                Err(error @ ClientError::Line(_)) => return Err(error.into()),
                 Err(_) => client.restore(&snapshot).map(|()| None)?,
             };
             Answer::Restored { bytes: snapshot.len(), changes }

@@ -121,7 +121,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
             outln!("{}", event_text::info(&client.info()?).join("\n"))?;
             match client.settings() {
                 Ok(settings) => outln!("{}", event_text::settings_text(&settings).join("\n"))?,
-                Err(ClientError::Line(error)) => return Err(ClientError::Line(error).into()),
+                Err(error @ ClientError::Line(_)) => return Err(error.into()),
                 Err(error) => errln!("the settings: {error}"),
             }
         }
@@ -168,8 +168,8 @@ fn restore(
     keep_settings: bool,
 ) -> anyhow::Result<()> {
     let changes = match client.modes() {
-        Ok(_) => client.restore_and_compare(snapshot, keep_settings)?,
-        Err(ClientError::Line(error)) => return Err(ClientError::Line(error).into()),
+        Ok(before) => client.restore_and_compare(snapshot, &before, keep_settings)?,
+        Err(error @ ClientError::Line(_)) => return Err(error.into()),
         Err(error) => {
             ensure!(!keep_settings, "--keep-settings needs the settings: {error}");
             client.restore(snapshot)?;
