@@ -8,7 +8,7 @@
 //! assert_eq!(setting::named("colour", 40), None);
 //! ```
 
-use toposlam::wire::Setting;
+use toposlam::wire::{Refusal, Setting};
 
 /// Name of each setting, in the order of the wire numbers.
 pub const NAMES: [&str; 9] = [
@@ -48,8 +48,8 @@ const RANGES: [&str; NAMES.len()] = [
     "0 to 65535",
 ];
 
-/// The name and the value of a setting; `None` if it is newer than this program.
-pub fn parts(setting: Setting) -> Option<(&'static str, u16)> {
+/// The wire number and the value of a setting; `None` if it is newer than this program.
+fn numbered(setting: Setting) -> Option<(usize, u16)> {
     let value = match setting {
         Setting::NoiseMm(value)
         | Setting::Hypotheses(value)
@@ -62,8 +62,12 @@ pub fn parts(setting: Setting) -> Option<(&'static str, u16)> {
         | Setting::SnapshotEveryPlaces(value) => value,
         _ => return None,
     };
-    let name = NAMES.iter().zip(MAKE).find(|(_, make)| make(value) == setting);
-    name.map(|(&name, _)| (name, value))
+    MAKE.iter().position(|make| make(value) == setting).map(|number| (number, value))
+}
+
+/// The name and the value of a setting; `None` if it is newer than this program.
+pub fn parts(setting: Setting) -> Option<(&'static str, u16)> {
+    numbered(setting).map(|(number, value)| (NAMES[number], value))
 }
 
 /// A setting as its name and value.
@@ -73,11 +77,9 @@ pub fn text(setting: Setting) -> String {
 
 /// Why a robot refuses a setting as out of range: its name and its range.
 pub fn out_of_range(setting: Setting) -> String {
-    let known =
-        parts(setting).and_then(|(name, value)| Some((name, value, NAMES.iter().position(|&known| known == name)?)));
-    known.map_or_else(
-        || "a value is out of its range".to_owned(),
-        |(name, value, number)| format!("{name} {value} is out of its range, {}", RANGES[number]),
+    numbered(setting).map_or_else(
+        || Refusal::OutOfRange.to_string(),
+        |(number, value)| format!("{} {value} is out of its range, {}", NAMES[number], RANGES[number]),
     )
 }
 
