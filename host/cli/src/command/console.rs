@@ -6,7 +6,7 @@ use std::time::{Duration, Instant};
 
 use anyhow::{Context, bail, ensure};
 use clap::{Args, Subcommand, ValueEnum};
-use toposlam::wire::{Command, GoalState, GoalStatus, MapReplica, Message, Outcome};
+use toposlam::wire::{Command, GoalState, GoalStatus, MapReplica, Message};
 use toposlam_cli::output::ExitError;
 use toposlam_cli::{errln, outln, output};
 use toposlam_link::client::{Client, ClientError};
@@ -86,7 +86,7 @@ enum Action {
     GoTo {
         /// Number of the vertex.
         vertex: u8,
-        /// Wait for the arrival. Exit status: 0 at the vertex, 3 if the robot gives up, 4 after the time.
+        /// Wait for the arrival. Exit status: 0 at the vertex, 3 if the robot gives up, 4 after --wait-s.
         #[arg(long)]
         wait: bool,
         /// Longest wait, in seconds.
@@ -113,9 +113,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     if let Action::GoTo { vertex, wait: true, wait_s } = arguments.action {
         return go_to(line, arguments, vertex, wait_s);
     }
-    let mut client = Client::new(line, rand::random(), |_: &Listener, _: Event<'_>| {});
-    client.timeout = Duration::from_millis(arguments.timeout_ms);
-    client.attempts = arguments.attempts;
+    let mut client = client(line, arguments, |_: &Listener, _: Event<'_>| {});
     match &arguments.action {
         Action::Info => {
             outln!("{}", event_text::info(&client.info()?).join("\n"))?;
@@ -138,9 +136,8 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
         }
         Action::Get { name } => {
             let settings = client.settings()?;
-            let is_wanted = |known: &str| name.as_deref().is_none_or(|name| name == known);
-            let chosen: Vec<_> = settings.iter().filter_map(|&setting| setting::parts(setting)).collect();
-            let chosen: Vec<_> = chosen.into_iter().filter(|(known, _)| is_wanted(known)).collect();
+            let known = settings.iter().filter_map(|&setting| setting::parts(setting));
+            let chosen: Vec<_> = known.filter(|(known, _)| name.as_deref().is_none_or(|name| name == *known)).collect();
             ensure!(!chosen.is_empty(), "the robot has no such setting");
             for (name, value) in chosen {
                 outln!("{name} {value}")?;
@@ -159,6 +156,17 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
         Action::Pause { state } => order(&mut client, Command::Pause { on: *state == Switch::On })?,
     }
     Ok(())
+}
+
+fn client<F: FnMut(&Listener, Event<'_>)>(
+    line: Box<dyn Line>,
+    arguments: &Arguments,
+    on_event: F,
+) -> Client<Box<dyn Line>, F> {
+    let mut client = Client::new(line, rand::random(), on_event);
+    client.timeout = Duration::from_millis(arguments.timeout_ms);
+    client.attempts = arguments.attempts;
+    client
 }
 
 /// Restores a snapshot and prints what it has changed beside the map.
@@ -185,10 +193,9 @@ fn restore(
 }
 
 fn order(client: &mut Client<Box<dyn Line>, impl FnMut(&Listener, Event<'_>)>, command: Command) -> anyhow::Result<()> {
-    match client.request(command)? {
-        Outcome::Done => {}
-        Outcome::Refused(refusal) => bail!("the robot refused: {}", event_text::refusal(&command, refusal)),
-        other => return Err(ClientError::from(other).into()),
+    match client.order(command) {
+        Err(ClientError::Refused(refusal)) => bail!("the robot refused: {}", event_text::refusal(&command, refusal)),
+        done => done?,
     }
     outln!("done")?;
     Ok(())
@@ -200,7 +207,7 @@ fn seconds(text: &str) -> Result<f64, String> {
 
 /// Sends the robot to a vertex and waits until it is there.
 fn go_to(line: Box<dyn Line>, arguments: &Arguments, vertex: u8, wait_s: f64) -> anyhow::Result<()> {
-    // What was sent before the reply is about the goal before.
+    // A status that was sent before the reply is that of the previous goal.
     let (goal, is_sent) = (RefCell::new(None::<GoalStatus>), Cell::new(false));
     // A final state ends the wait; the status of the next goal follows it.
     let is_open = || goal.borrow().is_none_or(|goal| goal.state == GoalState::Active);
@@ -209,9 +216,7 @@ fn go_to(line: Box<dyn Line>, arguments: &Arguments, vertex: u8, wait_s: f64) ->
         Event::Message(_, Message::GoalStatus(status)) if is_open() => *goal.borrow_mut() = Some(*status),
         _ => {}
     };
-    let mut client = Client::new(line, rand::random(), on_event);
-    client.timeout = Duration::from_millis(arguments.timeout_ms);
-    client.attempts = arguments.attempts;
+    let mut client = client(line, arguments, on_event);
     let deadline = Instant::now() + Duration::from_secs_f64(wait_s);
     order(&mut client, Command::GoTo { vertex })?;
     let mut asked = Instant::now();
