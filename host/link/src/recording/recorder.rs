@@ -9,17 +9,14 @@ use toposlam::FaultKind;
 use toposlam::wire::{Arrival, Message};
 
 use super::RecordingError;
-use super::scene::{Scene, scan, timestamp};
+use super::drawing::Drawing;
+use super::scene::{scan, timestamp};
 use super::topics::{Topic, Topics};
 use crate::json;
-use crate::layout::Layout;
 use crate::listener::{Event, Listener};
-use crate::topology::TopologicalMap;
 
 /// Maximum length of a frame; a longer run without a terminator is written in pieces.
 const PIECE_BYTES: usize = 256;
-/// Minimum interval between two scenes of the map.
-const DRAWING_PERIOD_NS: u64 = 100_000_000;
 
 const FAULT_KINDS: usize = FaultKind::ALL.len();
 
@@ -65,12 +62,7 @@ impl<FILE: Write> Recorder<FILE> {
     /// If the file cannot be written.
     pub fn new(file: FILE) -> Result<Self, RecordingError> {
         Ok(Self {
-            notes: Notes {
-                topics: Topics::create(file)?,
-                layout: Layout::new(),
-                drawn: None,
-                faults: [0; FAULT_KINDS],
-            },
+            notes: Notes { topics: Topics::create(file)?, drawing: Drawing::default(), faults: [0; FAULT_KINDS] },
             listener: Listener::new(),
             piece: Vec::with_capacity(PIECE_BYTES),
             newest_ns: 0,
@@ -91,7 +83,7 @@ impl<FILE: Write> Recorder<FILE> {
                 self.take_in(time_ns)?;
             }
         }
-        self.notes.draw(&self.listener, time_ns)
+        if self.notes.drawing.is_due(time_ns) { self.notes.draw(&self.listener, time_ns) } else { Ok(()) }
     }
 
     fn take_in(&mut self, time_ns: u64) -> Result<(), RecordingError> {
@@ -129,7 +121,7 @@ impl<FILE: Write> Recorder<FILE> {
         if !self.piece.is_empty() {
             self.take_in(time_ns)?;
         }
-        self.notes.redraw(&self.listener, time_ns)?;
+        self.notes.draw(&self.listener, time_ns)?;
         self.notes.topics.finish()?;
         Ok(self.summary)
     }
@@ -138,17 +130,9 @@ impl<FILE: Write> Recorder<FILE> {
 /// State of the topics beside the frames.
 struct Notes<FILE: Write> {
     topics: Topics<FILE>,
-    layout: Layout,
-    drawn: Option<Drawn>,
+    drawing: Drawing,
     /// The newest count of each kind of fault.
     faults: [u32; FAULT_KINDS],
-}
-
-/// The map in its last scene.
-struct Drawn {
-    map: TopologicalMap,
-    robot: Option<u8>,
-    time_ns: u64,
 }
 
 impl<FILE: Write> Notes<FILE> {
@@ -166,7 +150,7 @@ impl<FILE: Write> Notes<FILE> {
         if header.arrival == Arrival::Restart {
             self.faults = [0; FAULT_KINDS];
         }
-        self.layout.apply(header, message);
+        self.drawing.layout.apply(header, message);
         if let Message::Fault { kind, count } = message { self.fault(*kind, *count, time_ns) } else { Ok(()) }
     }
 
@@ -191,22 +175,9 @@ impl<FILE: Write> Notes<FILE> {
     }
 
     fn draw(&mut self, listener: &Listener, time_ns: u64) -> Result<(), RecordingError> {
-        let is_soon = |drawn: &Drawn| time_ns.saturating_sub(drawn.time_ns) < DRAWING_PERIOD_NS;
-        if self.drawn.as_ref().is_some_and(is_soon) { Ok(()) } else { self.redraw(listener, time_ns) }
-    }
-
-    fn redraw(&mut self, listener: &Listener, time_ns: u64) -> Result<(), RecordingError> {
-        let map = listener.map();
-        let robot = listener.replica().location().map(|location| location.vertex);
-        if self.drawn.as_ref().is_some_and(|drawn| drawn.map == map && drawn.robot == robot) {
-            return Ok(());
-        }
-        self.layout.arrange(&map);
-        let scene = Scene { map: &map, layout: &self.layout, robot };
+        let Some(scene) = self.drawing.scene(listener, time_ns) else { return Ok(()) };
         self.topics.message(Topic::Map, time_ns, 0, &scene.update(time_ns))?;
         self.topics.message(Topic::Vertices, time_ns, 0, &scene.vertices(time_ns))?;
-        self.topics.message(Topic::Transform, time_ns, 0, &scene.transform(time_ns))?;
-        self.drawn = Some(Drawn { map, robot, time_ns });
-        Ok(())
+        self.topics.message(Topic::Transform, time_ns, 0, &scene.transform(time_ns))
     }
 }

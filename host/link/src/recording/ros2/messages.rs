@@ -5,10 +5,9 @@ use std::f64::consts::TAU;
 use toposlam::ring::Echo;
 use toposlam::wire::Echoes;
 
-use super::super::scene::{MAP_FRAME, METRES_PER_EDGE, ROBOT_FRAME};
+use super::super::scene::{MAP_FRAME, METRES_PER_EDGE, ROBOT_FRAME, Scene};
 use super::cdr::Cdr;
-use crate::layout::{Layout, Point};
-use crate::topology::TopologicalMap;
+use crate::layout::Point;
 
 const CYLINDER: i32 = 3;
 const LINE_LIST: i32 = 5;
@@ -97,12 +96,13 @@ impl Marker {
 }
 
 /// `visualization_msgs/msg/MarkerArray` of a map. It replaces all markers before.
-pub(super) fn markers(map: &TopologicalMap, layout: &Layout, here: Option<u8>, time_ns: u64) -> Vec<u8> {
+pub(super) fn markers(scene: &Scene<'_>, time_ns: u64) -> Vec<u8> {
+    let Scene { map, layout, robot } = *scene;
     let at = |point: &Point, z: f64| [METRES_PER_EDGE * point.x, METRES_PER_EDGE * point.y, z];
     let mut markers = vec![Marker { action: DELETE_ALL, ..Marker::new("", 0, 0, [0.0; 3], [0.0; 4]) }];
     for (vertex, (label, point)) in map.vertices.iter().zip(layout.points()).enumerate() {
         let width_m = 2.0 * f64::from(label.radius_mm.max(100)) / 1000.0;
-        let colour = if here.map(usize::from) == Some(vertex) { HERE } else { PLACE };
+        let colour = if robot.map(usize::from) == Some(vertex) { HERE } else { PLACE };
         let disc = Marker::new("places", vertex, CYLINDER, [width_m, width_m, DISC_M], colour);
         markers.push(Marker { at: at(point, 0.0), ..disc });
         let name = Marker::new("names", vertex, TEXT, [0.0, 0.0, TEXT_M], WHITE);

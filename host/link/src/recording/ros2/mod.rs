@@ -13,16 +13,13 @@ use std::path::{Path, PathBuf};
 use mcap::{WriteOptions, Writer, records::MessageHeader, write::NoSeek};
 use toposlam::wire::Message;
 
+use super::drawing::Drawing;
+use super::scene::Scene;
 use super::{RecordingError, Summary};
 use crate::export;
-use crate::layout::Layout;
 use crate::listener::{Event, Listener};
-use crate::topology::TopologicalMap;
 
-/// Minimum interval between two drawings of the map.
-const DRAWING_PERIOD_NS: u64 = 100_000_000;
-
-/// A topic, its message type, the definition of the type, and the number of its messages.
+/// A topic, its message type and the definition of the type.
 struct Topic {
     name: &'static str,
     message: &'static str,
@@ -55,9 +52,7 @@ pub struct Ros2Bag {
     /// Times of the first and the last message.
     span_ns: Option<(u64, u64)>,
     listener: Listener,
-    layout: Layout,
-    /// The map in its last drawing with the vertex of the robot, and the time of the drawing.
-    drawn: Option<(TopologicalMap, Option<u8>, u64)>,
+    drawing: Drawing,
     frame_mm: Option<f64>,
     summary: Summary,
 }
@@ -90,8 +85,7 @@ impl Ros2Bag {
             counts: [0; TOPICS.len()],
             span_ns: None,
             listener: Listener::new(),
-            layout: Layout::new(),
-            drawn: None,
+            drawing: Drawing::default(),
             frame_mm,
             summary: Summary::default(),
         })
@@ -103,11 +97,11 @@ impl Ros2Bag {
     /// If the file cannot be written.
     pub fn record(&mut self, bytes: &[u8], time_ns: u64) -> Result<(), RecordingError> {
         let mut scans = Vec::new();
-        let Self { listener, layout, summary, .. } = self;
+        let Self { listener, drawing, summary, .. } = self;
         listener.feed(bytes, |_, event| {
             let Event::Message(header, message) = event else { return };
             summary.frames = summary.frames.wrapping_add(1);
-            layout.apply(header, message);
+            drawing.layout.apply(header, message);
             match message {
                 Message::Ring { echoes, .. } => scans.push(messages::scan(echoes, time_ns)),
                 Message::Place { .. } => summary.places += 1,
@@ -118,25 +112,20 @@ impl Ros2Bag {
         for scan in scans {
             self.write(SCAN, time_ns, &scan)?;
         }
-        let is_soon = |(_, _, drawn_ns): &(_, _, u64)| time_ns.saturating_sub(*drawn_ns) < DRAWING_PERIOD_NS;
-        if self.drawn.as_ref().is_some_and(is_soon) { Ok(()) } else { self.draw(time_ns) }
+        if self.drawing.is_due(time_ns) { self.draw(time_ns) } else { Ok(()) }
     }
 
     fn draw(&mut self, time_ns: u64) -> Result<(), RecordingError> {
-        let map = self.listener.map();
-        let here = self.listener.replica().location().map(|location| location.vertex);
-        if map.vertices.is_empty()
-            || self.drawn.as_ref().is_some_and(|(drawn, robot, _)| *drawn == map && *robot == here)
-        {
+        // A bag has no empty map.
+        if self.listener.replica().vertices() == 0 {
             return Ok(());
         }
-        self.layout.arrange(&map);
-        let markers = messages::markers(&map, &self.layout, here, time_ns);
-        let route = export::geojson(&map, &self.layout, here, super::METRES_PER_EDGE, self.frame_mm);
+        let Some(scene) = self.drawing.scene(&self.listener, time_ns) else { return Ok(()) };
+        let markers = messages::markers(&scene, time_ns);
+        let Scene { map, layout, robot } = scene;
+        let route = export::geojson(map, layout, robot, super::METRES_PER_EDGE, self.frame_mm);
         self.write(MAP, time_ns, &markers)?;
-        self.write(ROUTE, time_ns, &messages::string(&route))?;
-        self.drawn = Some((map, here, time_ns));
-        Ok(())
+        self.write(ROUTE, time_ns, &messages::string(&route))
     }
 
     fn write(&mut self, topic: usize, time_ns: u64, data: &[u8]) -> Result<(), RecordingError> {
