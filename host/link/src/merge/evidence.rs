@@ -7,7 +7,7 @@ use toposlam::wire::{Way, WayId};
 
 use crate::topology::TopologicalMap;
 
-const TURN_MRAD: f64 = 6283.0;
+pub(super) const TURN_MRAD: f64 = 6283.0;
 /// The standard deviation of the difference of two mean radii of one place.
 const RADIUS_SD_MM: f64 = 60.0;
 /// The standard deviation of the difference of two logarithms of the mean travel time of one edge.
@@ -74,8 +74,8 @@ impl fmt::Display for Evidence {
         let Self { labels, ways, travel, loops, contradictions, .. } = self;
         write!(
             f,
-            "{:.1} nats: radii {labels:+.1}, ways {ways:+.1}, travel times {travel:+.1}, loops {loops:+.1}, {contradictions} contradictions, \
-             misfit {:.2}",
+            "{:.1} nats: radii {labels:+.1}, ways {ways:+.1}, travel times {travel:+.1}, loops {loops:+.1}, \
+             contradictions {contradictions}, misfit {:.2}",
             self.total(),
             self.misfit(),
         )

@@ -3,10 +3,8 @@
 use toposlam::wire::{Way, WayId};
 
 use super::alignment::Alignment;
-use super::evidence::bearing_between;
+use super::evidence::{TURN_MRAD, bearing_between};
 use crate::topology::{TopologicalMap, Vertex};
-
-const TURN_MRAD: f64 = 6283.0;
 
 /// A way of the merged map by where it comes from: a way of the first map, or one that only the second has.
 #[derive(Clone, Copy, PartialEq)]

@@ -4,8 +4,7 @@
 //! same, along all edges that both maps have. Each pair of ways gives one. An alignment is scored by the evidence for and
 //! against it, as a log-likelihood ratio against two unrelated parts of the building. The best one is taken if its probability
 //! is high enough, with the alignments that contradict it and with no common part as alternatives, and if it does not contradict
-//! itself. Parts that the maps have in
-//! common elsewhere are aligned in the same way afterwards.
+//! itself. Parts that the maps have in common elsewhere are aligned in the same way afterwards.
 //!
 //! ```
 //! use toposlam_link::merge::{MergeError, merge};
@@ -31,12 +30,12 @@ use crate::topology::TopologicalMap;
 
 /// An alignment with a smaller probability is refused.
 const LEAST_PROBABILITY: f64 = 0.99;
-/// So is one with less evidence, in nats.
+/// An alignment with less evidence, in nats, is refused.
 const LEAST_NATS: f64 = 10.0;
-/// So is one when an alignment that contradicts it has a larger share of its evidence: the building repeats itself, and evidence of
-/// vertices side by side is then not independent.
+/// An alignment is refused when one that contradicts it has a larger share of its evidence: the building repeats itself, and
+/// evidence of vertices side by side is then not independent.
 const RIVAL_SHARE: f64 = 0.5;
-/// So is one whose radii and travel times differ more than those of one place: a vertex of one map stands for two places.
+/// An alignment whose radii and travel times differ more is refused: a vertex of one map stands for two places.
 const MISFIT_MAX: f64 = 0.9;
 /// The most vertices of a merged map: those of the wire protocol.
 const VERTICES_MAX: usize = 64;
@@ -128,14 +127,16 @@ pub fn merge(first: &TopologicalMap, second: &TopologicalMap) -> Result<Merged, 
     }
     let background = Background::of(first, second);
     let alignments = alignments(first, second, &background);
+    let genus_max = folding::genus(first).max(folding::genus(second));
     let mut whole = Alignment::default();
+    let mut merged = None;
     let mut parts = Vec::new();
     while let Some((alignment, part)) = best(&alignments, &whole) {
         let joined = whole.with(alignment);
-        let genus = folding::genus(&folding::fold(first, second, &joined));
-        let is_planar = genus <= folding::genus(first).max(folding::genus(second));
-        if part.is_certain() && is_planar {
+        let folded = folding::fold(first, second, &joined);
+        if part.is_certain() && folding::genus(&folded) <= genus_max {
             whole = joined;
+            merged = Some(folded);
             parts.push(part);
         } else if parts.is_empty() {
             return Err(MergeError::Uncertain(Box::new(part)));
@@ -143,10 +144,7 @@ pub fn merge(first: &TopologicalMap, second: &TopologicalMap) -> Result<Merged, 
             break;
         }
     }
-    if parts.is_empty() {
-        return Err(MergeError::NothingInCommon);
-    }
-    let map = folding::fold(first, second, &whole);
+    let map = merged.ok_or(MergeError::NothingInCommon)?;
     if map.vertices.len() > VERTICES_MAX {
         return Err(MergeError::TooManyVertices(map.vertices.len()));
     }
