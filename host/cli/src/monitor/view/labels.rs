@@ -36,9 +36,7 @@ pub(super) fn place(labels: &[Label], area: Rect) -> Vec<Option<Placed>> {
         let fits = |&width: &u16| {
             // A blank separates it from the number.
             let rect = Rect { x: number.right() + 1, width, ..number };
-            let is_inside = is_free(rect, area, &[]);
-            let others = taken.iter().filter(|&&other| other != number);
-            (is_inside && others.into_iter().all(|other| !touches(rect, *other))).then_some(rect)
+            is_free(rect, area, &taken).then_some(rect)
         };
         let found = label.details.iter().enumerate().find_map(|(detail, width)| Some((detail, fits(width)?)));
         if let Some((_, rect)) = found {
