@@ -137,3 +137,14 @@ pub fn create(path: &Path, force: bool) -> anyhow::Result<File> {
 pub fn write_file(path: &Path, bytes: impl AsRef<[u8]>, force: bool) -> anyhow::Result<()> {
     create(path, force)?.write_all(bytes.as_ref()).with_context(|| format!("writing {}", path.display()))
 }
+
+/// Writes to a file as [`write_file`], or without one to the standard output.
+///
+/// # Errors
+/// If the file exists, or the output cannot be written.
+pub fn write(file: Option<&Path>, bytes: &[u8], force: bool) -> anyhow::Result<()> {
+    match file {
+        Some(path) => write_file(path, bytes, force),
+        None => Ok(write_bytes(bytes)?),
+    }
+}

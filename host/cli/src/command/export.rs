@@ -68,22 +68,15 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     let (map, here) = read(&arguments.source, arguments.baud)?;
     let mut layout = Layout::new();
     layout.arrange(&map);
-    let text = match arguments.format {
-        Format::Graphml => export::graphml(&map, &layout, here),
-        Format::Dot => export::dot(&map, &layout, here),
-        Format::Geojson => export::geojson(&map, &layout, here, arguments.edge_m, arguments.frame_mm),
-        Format::Json => export::json(&map, &layout, here),
-        Format::Svg => export::svg(&map, &layout, here),
-        Format::Snapshot => return write(arguments, &import::known_map(&map)?),
+    let bytes = match arguments.format {
+        Format::Graphml => export::graphml(&map, &layout, here).into_bytes(),
+        Format::Dot => export::dot(&map, &layout, here).into_bytes(),
+        Format::Geojson => export::geojson(&map, &layout, here, arguments.edge_m, arguments.frame_mm).into_bytes(),
+        Format::Json => export::json(&map, &layout, here).into_bytes(),
+        Format::Svg => export::svg(&map, &layout, here).into_bytes(),
+        Format::Snapshot => import::known_map(&map)?,
     };
-    write(arguments, text.as_bytes())
-}
-
-fn write(arguments: &Arguments, bytes: &[u8]) -> anyhow::Result<()> {
-    match &arguments.output {
-        Some(file) => output::write_file(file, bytes, arguments.force),
-        None => Ok(output::write_bytes(bytes)?),
-    }
+    output::write(arguments.output.as_deref(), &bytes, arguments.force)
 }
 
 /// Warns of what makes the map doubtful.

@@ -43,8 +43,5 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     let mut layout = Layout::new();
     layout.arrange(&merged.map);
     let text = export::json(&merged.map, &layout, here);
-    match &arguments.output {
-        Some(file) => output::write_file(file, text, arguments.force),
-        None => Ok(output::write_bytes(text.as_bytes())?),
-    }
+    output::write(arguments.output.as_deref(), text.as_bytes(), arguments.force)
 }
