@@ -1,7 +1,6 @@
 //! `toposlam export`: a robot's map as GraphML, DOT, GeoJSON, JSON, SVG, or a snapshot to localise on.
 
 use std::ffi::{OsStr, OsString};
-use std::fs::File;
 use std::io::{self, Read};
 use std::path::{Path, PathBuf};
 
@@ -12,7 +11,7 @@ use toposlam_link::client::Client;
 use toposlam_link::export;
 use toposlam_link::import;
 use toposlam_link::layout::Layout;
-use toposlam_link::line;
+use toposlam_link::line::{self, Line};
 use toposlam_link::listener::{Event, Listener, Understanding};
 #[cfg(feature = "recording")]
 use toposlam_link::recording::{self, RecordingError};
@@ -93,43 +92,38 @@ fn complain(listener: &Listener) {
 
 /// The map of a source, and the vertex of the robot if it is known.
 pub(crate) fn read(source: &OsStr, baud: u32) -> anyhow::Result<(TopologicalMap, Option<u8>)> {
-    if let Some(map) = map_file(Path::new(source)).with_context(|| format!("reading {}", source.display()))? {
-        return Ok((map, None));
-    }
-    let listener = listen(source, baud)?;
+    let path = Path::new(source);
+    let listener = if source == "-" {
+        recorded(io::stdin().lock()).context("reading the standard input")?
+    } else if path.extension().is_some_and(|extension| extension == "mcap") {
+        replayed(path).with_context(|| format!("reading {}", path.display()))?
+    } else if path.is_file() {
+        let reading = || format!("reading {}", path.display());
+        let bytes = std::fs::read(path).with_context(reading)?;
+        if let Some(map) = imported(&bytes).with_context(reading)? {
+            return Ok((map, None));
+        }
+        recorded(&bytes[..]).with_context(reading)?
+    } else {
+        let name = source.to_str().with_context(|| format!("{}: no such file", path.display()))?;
+        requested(line::open(name, baud)?)?
+    };
     complain(&listener);
     let map = listener.map();
     ensure!(!map.vertices.is_empty(), "{}: no map received", source.display());
     Ok((map, listener.replica().location().map(|location| location.vertex)))
 }
 
-/// The map of a file in JSON or of a snapshot; `None` for any other source.
-fn map_file(path: &Path) -> anyhow::Result<Option<TopologicalMap>> {
-    if !path.is_file() || path.extension().is_some_and(|extension| extension == "mcap") {
-        return Ok(None);
-    }
-    let bytes = std::fs::read(path)?;
+/// The map of a file in JSON or of a snapshot; `None` for other bytes.
+fn imported(bytes: &[u8]) -> anyhow::Result<Option<TopologicalMap>> {
     if bytes.trim_ascii_start().starts_with(b"{") {
-        return Ok(Some(import::json(std::str::from_utf8(&bytes)?)?));
+        return Ok(Some(import::json(std::str::from_utf8(bytes)?)?));
     }
-    Ok(import::snapshot(&bytes).ok())
+    Ok(import::snapshot(bytes).ok())
 }
 
-/// Reads the map of a source; returns the listener that holds it.
-fn listen(source: &OsStr, baud: u32) -> anyhow::Result<Listener> {
-    if source == "-" {
-        return recorded(io::stdin().lock()).context("reading the standard input");
-    }
-    let path = Path::new(source);
-    if path.extension().is_some_and(|extension| extension == "mcap") {
-        return replayed(path).with_context(|| format!("reading {}", path.display()));
-    }
-    if path.is_file() {
-        let file = File::open(source).with_context(|| format!("opening {}", path.display()))?;
-        return recorded(file).with_context(|| format!("reading {}", path.display()));
-    }
-    let name = source.to_str().with_context(|| format!("{}: no such file", path.display()))?;
-    let line = line::open(name, baud)?;
+/// The state of a robot with its whole map.
+fn requested(line: Box<dyn Line>) -> anyhow::Result<Listener> {
     let mut client = Client::new(line, rand::random(), |_: &Listener, _: Event<'_>| {});
     client.map()?;
     Ok(client.listener().clone())
