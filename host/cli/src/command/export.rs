@@ -59,7 +59,7 @@ fn edge_m(text: &str) -> Result<f64, String> {
     super::drive::number_in(text, 0.1..=1000.0)
 }
 
-fn frame_mm(text: &str) -> Result<f64, String> {
+pub(super) fn frame_mm(text: &str) -> Result<f64, String> {
     super::drive::number_in(text, 0.1..=1000.0)
 }
 

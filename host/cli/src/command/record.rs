@@ -11,6 +11,7 @@ use toposlam_cli::outln;
 use toposlam_link::line::{Line, open};
 use toposlam_link::recording::{Recorder, RecordingError, Ros2Bag, Summary};
 
+use super::export::frame_mm;
 use super::interrupt::Interrupt;
 
 const BUFFER_BYTES: usize = 4096;
@@ -20,7 +21,7 @@ const BUFFER_BYTES: usize = 4096;
 pub(crate) struct Arguments {
     /// Serial port of the robot, or tcp:HOST:PORT.
     line: String,
-    /// MCAP file to create, with --ros2 the folder of the bag; if it exists, that is an error.
+    /// MCAP file to create; with --ros2, the folder of the bag. An existing one is an error.
     file: PathBuf,
     /// Baud rate of a serial port.
     #[arg(long, default_value_t = 115_200)]
@@ -38,10 +39,6 @@ pub(crate) struct Arguments {
     /// in the route graph of a ROS 2 bag.
     #[arg(long, value_name = "MM", value_parser = frame_mm, requires = "ros2")]
     frame_mm: Option<f64>,
-}
-
-fn frame_mm(text: &str) -> Result<f64, String> {
-    super::drive::number_in(text, 0.1..=1000.0)
 }
 
 /// What is written.
