@@ -1,29 +1,17 @@
 //! The command line: output, files and errors.
 
 mod monitor;
+mod program;
 
 use std::io::{Read, Write};
 use std::net::TcpListener;
 use std::path::Path;
-use std::process::{Command, Output};
 
 use toposlam::wire::{
     self, Chunk, Encoder, Inbox, Info, MAX_FRAME_BYTES, Message, Outcome, Refusal, ResetCause, Row, Version, crc32,
 };
 
-fn toposlam(arguments: &[&str]) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_toposlam")).args(arguments).output().unwrap()
-}
-
-fn printed(output: &Output) -> String {
-    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
-    String::from_utf8(output.stdout.clone()).unwrap()
-}
-
-fn complaint(output: &Output) -> String {
-    assert!(!output.status.success(), "{}", String::from_utf8_lossy(&output.stdout));
-    String::from_utf8(output.stderr.clone()).unwrap()
-}
+use program::{complaint, printed, toposlam};
 
 #[test]
 fn simulate_prints_a_line_for_each_place_and_draws_the_map() {

@@ -1,41 +1,20 @@
 //! What an operator does to a live robot and with files: settings, snapshots, goals, and files that exist already.
 
-use std::io::{BufRead, BufReader};
+mod program;
+
 use std::path::Path;
-use std::process::{Child, Command, Output, Stdio};
+use std::process::{Command, Output, Stdio};
 
-fn toposlam(arguments: &[&str]) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_toposlam")).args(arguments).output().unwrap()
+use program::{Robot, TOPOSLAM, complaint, printed, toposlam};
+
+/// A robot on a free port.
+fn robot(speed: &str) -> Robot {
+    Robot::start("127.0.0.1:0", speed)
 }
-
-fn printed(output: &Output) -> String {
-    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
-    String::from_utf8(output.stdout.clone()).unwrap()
-}
-
-fn complaint(output: &Output) -> String {
-    assert!(!output.status.success(), "{}", String::from_utf8_lossy(&output.stdout));
-    String::from_utf8(output.stderr.clone()).unwrap()
-}
-
-/// A simulated robot and its line; it ends with the test.
-struct Robot(Child, String);
 
 impl Robot {
-    fn start(speed: &str) -> Self {
-        let mut robot = Command::new(env!("CARGO_BIN_EXE_toposlam"))
-            .args(["robot", "--listen", "127.0.0.1:0", "--plan", "ring", "--speed", speed])
-            .stdout(Stdio::piped())
-            .spawn()
-            .unwrap();
-        let mut line = String::new();
-        BufReader::new(robot.stdout.take().unwrap()).read_line(&mut line).unwrap();
-        let line = line.split_whitespace().last().unwrap().to_owned();
-        Self(robot, line)
-    }
-
     fn command(&self, arguments: &[&str]) -> Output {
-        toposlam(&[&["command", &self.1], arguments].concat())
+        toposlam(&[&["command", &self.line], arguments].concat())
     }
 
     /// Waits for a map of this many vertices.
@@ -49,13 +28,6 @@ impl Robot {
     }
 }
 
-impl Drop for Robot {
-    fn drop(&mut self) {
-        let _ = self.0.kill();
-        let _ = self.0.wait();
-    }
-}
-
 fn path<'a>(directory: &'a tempfile::TempDir, name: &str) -> &'a str {
     let file = directory.path().join(name);
     Box::leak(file.to_str().unwrap().to_owned().into_boxed_str())
@@ -63,7 +35,7 @@ fn path<'a>(directory: &'a tempfile::TempDir, name: &str) -> &'a str {
 
 #[test]
 fn every_setting_is_read_and_a_value_out_of_range_names_the_range() {
-    let robot = Robot::start("20");
+    let robot = robot("20");
     let settings = printed(&robot.command(&["get"]));
     for name in ["noise-mm ", "equidistance-mm ", "leave-mm ", "speed-permille 1000", "snapshot-every-places "] {
         assert!(settings.lines().any(|line| line.starts_with(name)), "{name}: {settings}");
@@ -82,7 +54,7 @@ fn every_setting_is_read_and_a_value_out_of_range_names_the_range() {
 fn restore_says_what_it_changes_and_can_keep_the_settings() {
     let directory = tempfile::tempdir().unwrap();
     let file = path(&directory, "robot.snapshot");
-    let robot = Robot::start("100");
+    let robot = robot("100");
     robot.wait_for_vertices(2);
     printed(&robot.command(&["set", "noise-mm", "77"]));
     printed(&robot.command(&["snapshot", file]));
@@ -112,15 +84,15 @@ fn restore_says_what_it_changes_and_can_keep_the_settings() {
 
 #[test]
 fn go_to_waits_for_the_arrival_and_its_exit_status_says_how_it_ended() {
-    let robot = Robot::start("200");
+    let robot = robot("200");
     robot.wait_for_vertices(3);
     let output = robot.command(&["go-to", "0", "--wait", "--wait-s", "60"]);
     assert!(printed(&output).contains("at vertex 0"));
     printed(&robot.command(&["pause", "on"]));
     let output = robot.command(&["go-to", "1", "--wait", "--wait-s", "0.5"]);
     assert_eq!(output.status.code(), Some(4), "{}", complaint(&output));
-    let waiting = Command::new(env!("CARGO_BIN_EXE_toposlam"))
-        .args(["command", &robot.1, "go-to", "1", "--wait", "--wait-s", "60"])
+    let waiting = Command::new(TOPOSLAM)
+        .args(["command", &robot.line, "go-to", "1", "--wait", "--wait-s", "60"])
         .stdout(Stdio::null())
         .stderr(Stdio::piped())
         .spawn()
@@ -176,12 +148,12 @@ fn file_names_need_not_be_utf_8() {
     let named = |name: &[u8]| directory.path().join(OsStr::from_bytes(name));
     let (plan, svg, stream) = (named(b"pl\xffan.txt"), named(b"m\xffap.svg"), named(b"st\xffream.bin"));
     std::fs::write(&plan, "cell_mm 500\n#########\n#.......#\n#.#####.#\n#.......#\n#########\n").unwrap();
-    let run = |arguments: &[&OsStr]| Command::new(env!("CARGO_BIN_EXE_toposlam")).args(arguments).output().unwrap();
+    let run = |arguments: &[&OsStr]| Command::new(TOPOSLAM).args(arguments).output().unwrap();
     printed(&run(&["plan".as_ref(), plan.as_ref(), "--svg".as_ref(), svg.as_ref()]));
     assert!(Path::new(&svg).is_file());
-    let robot = Robot::start("100");
+    let robot = robot("100");
     robot.wait_for_vertices(2);
-    let mut line = std::net::TcpStream::connect(robot.1.trim_start_matches("tcp:")).unwrap();
+    let mut line = std::net::TcpStream::connect(robot.address()).unwrap();
     let mut bytes = vec![0; 20_000];
     std::io::Read::read_exact(&mut line, &mut bytes).unwrap();
     std::fs::write(&stream, &bytes).unwrap();

@@ -2,9 +2,9 @@
 
 mod terminal;
 
-use std::io::{BufRead, BufReader, Write};
+use std::io::Write;
 use std::ops::ControlFlow;
-use std::process::{Child, Command, Stdio};
+use std::process::{Command, Stdio};
 
 use serde_json::Value;
 use terminal::PseudoTerminal;
@@ -14,40 +14,7 @@ use toposlam_link::link::Options;
 use toposlam_sim::exploration::Exploration;
 use toposlam_sim::world::{Plan, RobotModel};
 
-use super::{complaint, printed, toposlam};
-
-const TOPOSLAM: &str = env!("CARGO_BIN_EXE_toposlam");
-
-/// `toposlam robot`, which runs until it is dropped.
-struct Robot {
-    process: Child,
-    line: String,
-}
-
-impl Robot {
-    fn at(address: &str) -> Self {
-        let mut process = Command::new(TOPOSLAM)
-            .args(["robot", "--plan", "ring", "--speed", "50", "--listen", address])
-            .stdout(Stdio::piped())
-            .spawn()
-            .unwrap();
-        let mut first_line = String::new();
-        BufReader::new(process.stdout.as_mut().unwrap()).read_line(&mut first_line).unwrap();
-        let line = first_line.split_whitespace().last().unwrap().to_owned();
-        Self { process, line }
-    }
-
-    fn address(&self) -> String {
-        self.line.trim_start_matches("tcp:").to_owned()
-    }
-}
-
-impl Drop for Robot {
-    fn drop(&mut self) {
-        self.process.kill().unwrap();
-        self.process.wait().unwrap();
-    }
-}
+use super::program::{Robot, TOPOSLAM, complaint, printed, toposlam};
 
 /// The stream of a robot until it has detected the given number of places.
 fn recording(places: usize) -> Vec<u8> {
@@ -64,7 +31,7 @@ fn recording(places: usize) -> Vec<u8> {
 
 #[test]
 fn headless_json_prints_an_object_per_line_and_stops_at_the_event_limit() {
-    let robot = Robot::at("127.0.0.1:0");
+    let robot = Robot::start("127.0.0.1:0", "50");
     let text = printed(&toposlam(&["monitor", &robot.line, "--headless", "--json", "--events", "100"]));
     let events: Vec<Value> = text.lines().map(|line| serde_json::from_str(line).unwrap()).collect();
     assert_eq!(events.len(), 101, "{text}");
@@ -104,7 +71,7 @@ fn headless_fails_after_a_timeout_and_the_screen_without_a_terminal() {
 
 #[test]
 fn the_screen_shows_a_robot_reconnects_and_restores_the_terminal() {
-    let robot = Robot::at("127.0.0.1:0");
+    let robot = Robot::start("127.0.0.1:0", "50");
     let Some(mut terminal) = PseudoTerminal::running(&format!("{TOPOSLAM} monitor {}", robot.line)) else { return };
     for text in ["connected", "its rivals", "at vertex", "as the robot has it"] {
         terminal.wait_for(text);
@@ -119,7 +86,7 @@ fn the_screen_shows_a_robot_reconnects_and_restores_the_terminal() {
     let address = robot.address();
     drop(robot);
     terminal.wait_for("trying again");
-    let _robot = Robot::at(&address);
+    let _robot = Robot::start(&address, "50");
     terminal.wait_until("the line is open again", |text| !text.contains("What is shown is as it was"));
     terminal.press("i");
     terminal.wait_for("info: toposlam");
