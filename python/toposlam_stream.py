@@ -1295,7 +1295,8 @@ def _bits(row: int) -> Iterator[int]:
 
 def to_json(event: Event) -> dict[str, Any]:
     """An event as plain data, as the `toposlam` command prints it: `event` is the name of the message, `Damaged`, or
-    `Unknown` for an intact frame of another version, with the fields of the message beside it. `lost` is present if frames are missing before it."""
+    `Unknown` for an intact frame of another version, with the fields of the message beside it. `lost` is present if frames
+    are missing before it."""
     if isinstance(event, Damaged):
         is_unknown = event.error in (DecodeError.UNKNOWN_VERSION, DecodeError.UNKNOWN_MESSAGE)
         return {"event": "Unknown" if is_unknown else "Damaged", "error": str(event)}

@@ -2,7 +2,8 @@
 //!
 //! [`emulator`] runs the firmware in a simulated building. [`monitor`] shows a robot in a terminal, [`serve`] in
 //! browsers, and `publish` (feature `mqtt`) publishes it to an MQTT broker; [`fleet`] monitors a thousand robots at
-//! once. [`output`] is the standard output of all commands. [`picture`] draws a map over its floor plan, and [`progress`] a progress bar.
+//! once. [`output`] is the standard output of all commands. [`picture`] draws a map over its floor plan, and [`progress`] a
+//! progress bar.
 
 // `outln!` and `errln!` do not panic when the output fails.
 #![cfg_attr(not(test), deny(clippy::print_stdout, clippy::print_stderr))]

@@ -25,8 +25,9 @@ use toposlam::{DartMap, Fingerprint, Map, WAYS_MAX};
 
 use crate::topology::{TopologicalMap, Vertex};
 
-/// In turns of 2¹⁶ and in milliradians.
-const TURN: (u32, u32) = (1 << 16, 6283);
+/// A whole turn, in the units of [`DartMap::add_way`] and in milliradians.
+const TURN: u32 = 1 << 16;
+const TURN_MRAD: u32 = 6283;
 /// More visits do not make a label of a known map more certain.
 const VISITS_MAX: u32 = 512;
 
@@ -116,7 +117,7 @@ fn check(map: &TopologicalMap) -> Result<(), &'static str> {
     }
     let is_mutual = |(id, way): (WayId, &Way)| {
         let end = |end: WayId| end != id && map.way(end).is_some_and(|other| other.leads_to == Some(id));
-        u32::from(way.bearing_mrad) < TURN.1 && way.leads_to.is_none_or(end)
+        u32::from(way.bearing_mrad) < TURN_MRAD && way.leads_to.is_none_or(end)
     };
     if map.all_ways().all(is_mutual) { Ok(()) } else { Err("an edge has one end, or a bearing is not below 6283") }
 }
@@ -168,7 +169,7 @@ fn darts(map: &TopologicalMap) -> Option<DartMap<VERTICES, DARTS>> {
     let mut numbers: Vec<Vec<u8>> = Vec::new();
     for ways in &map.ways {
         let vertex = darts.add_vertex()?;
-        let bearing = |way: &Way| (u32::from(way.bearing_mrad) * TURN.0).div_ceil(TURN.1) as u16;
+        let bearing = |way: &Way| (u32::from(way.bearing_mrad) * TURN).div_ceil(TURN_MRAD) as u16;
         numbers.push(ways.iter().map(|way| darts.add_way(vertex, bearing(way))).collect::<Option<_>>()?);
     }
     for edge in map.way_edges() {

@@ -16,8 +16,8 @@ use toposlam::wire::{Arrival, Echoes, Message};
 use crate::event_text;
 use crate::listener::Event;
 
-/// One event. `event` is the name of the message, `Damaged`, or `Unknown` for an intact frame of another version; the message's fields follow under their names. `lost`
-/// is present if frames are missing before the event.
+/// One event. `event` is the name of the message, `Damaged`, or `Unknown` for an intact frame of another version; the message's
+/// fields follow under their names. `lost` is present if frames are missing before the event.
 pub fn event(event: Event<'_>) -> Value {
     let (header, message) = match event {
         Event::Damaged(error) => {

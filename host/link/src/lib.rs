@@ -1,10 +1,11 @@
 //! The host's end of a robot's serial line.
 //!
-//! [`mod@line`] opens a line; [`broadcast`] is the robot's end of one, and [`playback`] a recording in the place of a robot. [`listener`] decodes bytes into events,
-//! [`client`] sends requests, [`topology`] holds the map as plain data, and [`layout`] computes positions for drawing
-//! it. [`export`] writes the map in other formats, and `recording` (feature `recording`) records the line. [`link`]
-//! keeps a line open in its own thread, and [`watch`] keeps the newest state of a link. [`event_text`] and [`mod@json`]
-//! format an event as text and as JSON; [`mod@setting`] names the robot's settings.
+//! [`mod@line`] opens a line; [`broadcast`] is the robot's end of one, and [`playback`] plays a recording as a robot.
+//! [`listener`] decodes bytes into events, [`client`] sends requests, [`topology`] holds the map as plain data, and
+//! [`layout`] computes positions for drawing it. [`export`] writes the map in other formats, [`mod@import`] reads it from
+//! files, [`mod@merge`] merges two maps, and `recording` (feature `recording`) records the line. [`link`] keeps a line open
+//! in its own thread, and [`watch`] keeps the newest state of a link. [`event_text`] and [`mod@json`] format an event as
+//! text and as JSON; [`mod@setting`] names the robot's settings.
 
 pub mod broadcast;
 pub mod client;

@@ -343,7 +343,7 @@ impl fmt::Display for LineFailure {
     }
 }
 
-/// A device is written to, and not replaced.
+/// Whether a path is a device, which is written to and not replaced.
 fn is_device(file: &Path) -> bool {
     file.exists() && !file.is_file()
 }

@@ -1,5 +1,5 @@
-//! A recorded stream in the place of a robot: it is numbered again, so that replies fit in, and answers the requests that a
-//! recording can answer.
+//! Plays a recorded stream as a robot: numbers its frames again, so that replies fit between them, and answers the requests
+//! that a recording can answer.
 //!
 //! | Request | Answer |
 //! |---|---|
@@ -31,7 +31,7 @@ use toposlam::wire::{
 
 use crate::listener::{Event, Listener};
 
-/// So far back is a restart and not a late frame.
+/// A sequence number this far behind the last one is a restart, not a late frame.
 const RESTART: u16 = 0x4000;
 const CRC_BYTES: usize = 4;
 

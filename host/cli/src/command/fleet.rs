@@ -19,7 +19,7 @@ const REPORT: Duration = Duration::from_secs(1);
 /// Maximum wait for connections before the first report.
 const CONNECTING: Duration = Duration::from_secs(5);
 
-/// Open files that are no connection.
+/// Open files that are not connections.
 const OTHER_FILES: u64 = 32;
 
 /// Arguments of `toposlam fleet`.
@@ -93,20 +93,20 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     }
     outln!("in all: {}", last.since(&start))?;
     let robots = fleet.robots().len().max(1) as u64;
-    outln!("{} bytes a robot in this process's own books", size_of::<Robot>())?;
+    outln!("{} bytes of state per robot", size_of::<Robot>())?;
     if let (Some(before), Some(after)) = (resident_before, resident_bytes()) {
-        outln!("{} bytes of memory in use a robot, {after} in all", after.saturating_sub(before) / robots)?;
+        outln!("{} bytes of resident memory per robot, {after} in all", after.saturating_sub(before) / robots)?;
     }
     Ok(())
 }
 
-/// Fails if this process may not open a connection for each robot. The process of the robots has the same limit.
+/// Fails if this process may not open a connection for each robot. The same limit holds for the process of the robots.
 fn check_connections(robots: u32) -> anyhow::Result<()> {
     let Some(most) = most_connections() else { return Ok(()) };
     let most = most.saturating_sub(OTHER_FILES);
     ensure!(
         u64::from(robots) <= most,
-        "--simulate {robots}: the operating system allows {most} connections for a process (`ulimit -Hn`) and local port"
+        "--simulate {robots}: the operating system allows {most} connections per process (open files of `ulimit -Hn`, and local ports)"
     );
     Ok(())
 }
@@ -144,7 +144,7 @@ impl Sample {
         );
         if let (Some(now), Some(then)) = (self.computing, earlier.computing) {
             let computing = (now - then).as_secs_f64();
-            text += &format!("; {:.1} % of a core, on a whole one {}", computing / seconds * 100.0, rates(computing));
+            text += &format!("; {:.1} % of a core, on a whole core {}", computing / seconds * 100.0, rates(computing));
         }
         text += &format!("; {} frames lost, {} damaged", now.lost - then.lost, now.damaged - then.damaged);
         if now.unknown > then.unknown {
