@@ -163,5 +163,5 @@ fn file_names_need_not_be_utf_8() {
     std::fs::write(&stream, [&bytes[..], &bytes].concat()).unwrap();
     let output = run(&["export".as_ref(), stream.as_ref(), "--format".as_ref(), "json".as_ref()]);
     assert_eq!(printed(&output), text);
-    assert!(String::from_utf8_lossy(&output.stderr).contains("1 restarts of the robot"));
+    assert!(String::from_utf8_lossy(&output.stderr).contains("1 restart of the robot;"));
 }

@@ -173,6 +173,16 @@ pub fn start(hello: &Hello) -> String {
     format!("{} ({reset_cause}), seed {seed}", if names.is_empty() { "started".to_owned() } else { names.join(", ") })
 }
 
+/// How often the robot restarted within a stream, and the map that is left of it; `None` if it did not.
+pub fn restarts(restarts: u32) -> Option<String> {
+    let times = match restarts {
+        0 => return None,
+        1 => "1 restart".to_owned(),
+        _ => format!("{restarts} restarts"),
+    };
+    Some(format!("{times} of the robot; the map is that of the last start"))
+}
+
 fn introduction(hello: &Hello) -> String {
     let rooms = hello.capacities;
     format!(

@@ -8,6 +8,7 @@ use anyhow::{Context, ensure};
 use clap::{Args, ValueEnum};
 use toposlam_cli::{errln, output};
 use toposlam_link::client::Client;
+use toposlam_link::event_text;
 use toposlam_link::export;
 use toposlam_link::import;
 use toposlam_link::layout::Layout;
@@ -84,9 +85,8 @@ fn complain(listener: &Listener) {
     if !matches!(understanding, Understanding::Whole | Understanding::Unknown) {
         errln!("{understanding}");
     }
-    match listener.counters().restarts {
-        0 => {}
-        restarts => errln!("{restarts} restarts of the robot; the map is that of the last start"),
+    if let Some(restarts) = event_text::restarts(listener.counters().restarts) {
+        errln!("{restarts}");
     }
 }
 

@@ -9,6 +9,7 @@ use anyhow::{Context, ensure};
 use clap::Args;
 use toposlam_cli::{errln, outln, output};
 use toposlam_link::broadcast::Broadcast;
+use toposlam_link::event_text;
 use toposlam_link::listener::Listener;
 use toposlam_link::playback::Playback;
 use toposlam_link::recording::Recording;
@@ -218,8 +219,8 @@ fn summarise(played: &Played) -> anyhow::Result<()> {
     let damaged = counters.corrupt + counters.cut + counters.too_long;
     let unknown = counters.unknown_version + counters.unknown_message;
     outln!("{} messages, {} frames lost, {damaged} damaged, {unknown} unknown", counters.messages, counters.lost)?;
-    if counters.restarts > 0 {
-        outln!("{} restarts of the robot; the map is that of the last start", counters.restarts)?;
+    if let Some(restarts) = event_text::restarts(counters.restarts) {
+        outln!("{restarts}")?;
     }
     outln!("{}", listener.understanding())?;
     print_map(listener.replica())
