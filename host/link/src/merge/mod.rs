@@ -175,7 +175,7 @@ fn best<'a>(alignments: &'a [Alignment], whole: &Alignment) -> Option<(&'a Align
     let best = *open.iter().max_by(|a, b| score(a).total_cmp(&score(b)))?;
     let rivals = || open.iter().filter(|rival| best.contradicts(rival));
     let rival_nats = rivals().map(|rival| score(rival)).max_by(f64::total_cmp);
-    // Each alignment, and together as much as any of them that there is no common part: all equally probable before.
+    // Beforehand all alignments are equally probable, and no common part is as probable as all of them together.
     let against: f64 = rivals().map(|rival| (score(rival) - score(best)).exp()).sum();
     let unrelated = open.len() as f64 * (-score(best)).exp();
     let probability = 1.0 / (1.0 + against + unrelated);
