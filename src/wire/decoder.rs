@@ -78,6 +78,20 @@ pub struct DecoderCounters {
     pub restarts: u32,
 }
 
+impl DecoderCounters {
+    /// Damaged frames: corrupt, truncated and too long ones.
+    #[must_use]
+    pub const fn damaged(&self) -> u32 {
+        self.corrupt.saturating_add(self.cut).saturating_add(self.too_long)
+    }
+
+    /// Intact frames that this version does not decode.
+    #[must_use]
+    pub const fn unknown(&self) -> u32 {
+        self.unknown_version.saturating_add(self.unknown_message)
+    }
+}
+
 /// Decodes the bytes of a serial line, in pieces of any length, into messages; on the robot, into
 /// [`Request`](super::Request)s.
 ///

@@ -216,8 +216,8 @@ fn summarise(played: &Played) -> anyhow::Result<()> {
         outln!("the file was cut: the end of the recording is missing")?;
     }
     let counters = listener.counters();
-    let damaged = counters.corrupt + counters.cut + counters.too_long;
-    let unknown = counters.unknown_version + counters.unknown_message;
+    let damaged = counters.damaged();
+    let unknown = counters.unknown();
     outln!("{} messages, {} frames lost, {damaged} damaged, {unknown} unknown", counters.messages, counters.lost)?;
     if let Some(restarts) = event_text::restarts(counters.restarts) {
         outln!("{restarts}")?;

@@ -212,8 +212,8 @@ impl Fleet {
             totals.bytes += robot.bytes;
             totals.places += robot.places;
             totals.lost += u64::from(counters.lost);
-            totals.damaged += [counters.corrupt, counters.cut, counters.too_long].map(u64::from).iter().sum::<u64>();
-            totals.unknown += u64::from(counters.unknown_version) + u64::from(counters.unknown_message);
+            totals.damaged += u64::from(counters.damaged());
+            totals.unknown += u64::from(counters.unknown());
         }
         totals
     }

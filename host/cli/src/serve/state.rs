@@ -124,8 +124,8 @@ fn live(listener: &Listener) -> Value {
             "messages": counters.messages,
             "lost": counters.lost,
             "restarts": counters.restarts,
-            "damaged": counters.corrupt.saturating_add(counters.cut).saturating_add(counters.too_long),
-            "unknown": counters.unknown_version.saturating_add(counters.unknown_message),
+            "damaged": counters.damaged(),
+            "unknown": counters.unknown(),
         },
     })
 }

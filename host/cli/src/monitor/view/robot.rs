@@ -62,8 +62,8 @@ fn faults(model: &Model) -> Line<'static> {
 
 fn received(model: &Model) -> Line<'static> {
     let counters = model.watch().listener().counters();
-    let unknown = counters.unknown_version.saturating_add(counters.unknown_message);
-    let damaged = counters.corrupt.saturating_add(counters.cut).saturating_add(counters.too_long);
+    let unknown = counters.unknown();
+    let damaged = counters.damaged();
     let style = if counters.lost > 0 || unknown > 0 || damaged > 0 { BAD } else { Style::new() };
     let text = format!(
         "{} frames, {} lost, {} corrupt, {} cut, {} too long, {unknown} unknown",
