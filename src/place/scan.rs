@@ -9,9 +9,20 @@ use crate::ring::{Echo, RingGeometry};
 /// Where the neighbour of an echo measures this percentage of its range, both echoes come from one wall, seen at an angle:
 /// nearer by more than noise, and by less than a separate object in front of a wall.
 const SLANTED_WALL_PERCENT: core::ops::Range<u32> = 67..92;
+/// With a wider mean angle than this between two sensors a ring has wide gaps, in milliradians.
+const WIDE_GAP_MRAD: u16 = 600;
 
-/// An opening within this angle of where a way must be is that way, in milliradians.
+/// A full turn, in milliradians.
+const FULL_TURN_MRAD: usize = 6283;
+
+/// Bearings are rounded to full milliradians.
+const BEARING_TOLERANCE_MRAD: u16 = 4;
+
+/// An opening within this angle of where a way must be is that way, in milliradians. In a ring with wider gaps than one of 16 sensors,
+/// the additional gap is added.
 const SAME_WAY_MRAD: u16 = 700;
+/// The angle between two sensors of a ring of 16, in milliradians.
+const SPACING_MRAD: u16 = 392;
 /// An obstacle more than this angle from a way is opposite to it, in milliradians.
 const OPPOSITE_MRAD: i32 = 2094;
 
@@ -59,6 +70,16 @@ impl<const SONARS: usize> RingScan<'_, SONARS> {
             };
             (echo, bearing_mrad)
         })
+    }
+
+    /// Whether the gaps between the sensors are so wide that a sensor looks into an opening only in some directions of the ring.
+    pub(super) const fn has_wide_gaps(&self) -> bool {
+        self.spacing_mrad() > WIDE_GAP_MRAD
+    }
+
+    /// Mean angle between two neighbouring sensors, in milliradians.
+    pub(crate) const fn spacing_mrad(&self) -> u16 {
+        (FULL_TURN_MRAD / SONARS) as u16
     }
 
     /// Largest difference of range between equidistant obstacles, in millimetres.
@@ -110,7 +131,8 @@ impl<const SONARS: usize> RingScan<'_, SONARS> {
     /// The opening that the sonars show where a way must be. The obstacle beside it is then none that hides the way.
     pub(super) fn measured_way(&self, way_mrad: i16, measured: &Obstacles) -> Option<i16> {
         let openings = Self { came_by_mrad: None, ..*self }.openings(measured);
-        openings.nearest(way_mrad, SAME_WAY_MRAD).map(|(_, opening_mrad)| opening_mrad)
+        let within_mrad = SAME_WAY_MRAD.saturating_add(self.spacing_mrad().saturating_sub(SPACING_MRAD));
+        openings.nearest(way_mrad, within_mrad).map(|(_, opening_mrad)| opening_mrad)
     }
 
     /// Whether a narrow way is at a meet point: it joins others, or an obstacle is opposite to it. Otherwise the robot passes it.
@@ -189,7 +211,7 @@ impl<const SONARS: usize> RingScan<'_, SONARS> {
         found.iter().all(|obstacle| self.separates(turn_mrad(obstacle.bearing_mrad, bearing_mrad)))
     }
 
-    const fn separates(&self, turn_mrad: i32) -> bool {
+    pub(super) const fn separates(&self, turn_mrad: i32) -> bool {
         turn_mrad.abs() >= self.separation_mrad as i32
     }
 
@@ -231,16 +253,17 @@ impl<const SONARS: usize> RingScan<'_, SONARS> {
         })
     }
 
-    /// The obstacle that an echo comes from. Its bearing is the mean over the sensors within half the separation that
-    /// measure about the same range, because noise decides which of them measures the shortest.
+    /// The obstacle that an echo comes from. Its bearing is the mean over the sensors within half the separation, or beside this one,
+    /// that measure about the same range, because noise decides which of them measures the shortest.
     #[inline(never)]
     fn obstacle(&self, (range_mm, bearing_mrad): (u16, i16)) -> Obstacle {
         let limit_mm = range_mm.saturating_add(self.equidistance_mm);
+        let beside_mrad = (self.separation_mrad / 2).max(self.spacing_mrad() + BEARING_TOLERANCE_MRAD);
         let mut count = 0i32;
         let mut sum_mrad = 0i32;
         for (other_mm, other_mrad) in self.ranges() {
             let turn_mrad = turn_mrad(bearing_mrad, other_mrad);
-            let near = turn_mrad.abs().saturating_mul(2) <= i32::from(self.separation_mrad);
+            let near = turn_mrad.abs() <= i32::from(beside_mrad);
             if near && is_echo(other_mm) && other_mm <= limit_mm {
                 count = count.saturating_add(1);
                 sum_mrad = sum_mrad.saturating_add(turn_mrad);
@@ -320,6 +343,50 @@ mod tests {
         ranges_mm[3] = SILENT_MM;
         let scan = scan_of_16(&ranges_mm, &ring, None);
         assert_eq!(scan.obstacles().iter().count(), 3, "{:?}", scan.obstacles());
+    }
+
+    #[test]
+    fn the_bearing_of_a_wall_is_the_mean_of_two_sensors_side_by_side_in_a_ring_of_12() {
+        let ring = RingGeometry::<12>::even();
+        let mut ranges_mm = [SILENT_MM; 12];
+        (ranges_mm[3], ranges_mm[4]) = (1000, 1020);
+        let scan = RingScan {
+            ranges_mm: &ranges_mm,
+            geometry: &ring,
+            separation_mrad: 1047,
+            equidistance_mm: 150,
+            came_by_mrad: None,
+        };
+        let wall = scan.nearest(|_| true).unwrap();
+        assert!((wall.bearing_mrad - 1833).abs() <= 2, "{wall:?}");
+    }
+
+    #[test]
+    fn a_single_sensor_of_a_dense_ring_that_misses_a_wall_and_its_corner_is_no_opening() {
+        // At a dead end: walls ahead and on both sides, and corners at 45°. Behind is the way.
+        let ring = RingGeometry::<24>::even();
+        let mut ranges_mm = [SILENT_MM; 24];
+        for (sensor, range_mm) in [(0, 1000), (1, 1003), (2, 1015), (3, 1414), (4, 1015), (5, 1003), (6, 1000)] {
+            ranges_mm[sensor] = range_mm;
+            ranges_mm[(24 - sensor) % 24] = range_mm;
+        }
+        for (sensor, range_mm) in [(7, 1003), (8, 1015), (16, 1015), (17, 1003)] {
+            ranges_mm[sensor] = range_mm;
+        }
+        ranges_mm[3] = SILENT_MM;
+        let scan = |ranges_mm: &[u16; 24]| {
+            let scan = RingScan {
+                ranges_mm,
+                geometry: &ring,
+                separation_mrad: 1047,
+                equidistance_mm: 150,
+                came_by_mrad: None,
+            };
+            scan.openings(&scan.obstacles()).count()
+        };
+        assert_eq!(scan(&ranges_mm), 1);
+        ranges_mm[2] = SILENT_MM;
+        assert_eq!(scan(&ranges_mm), 2, "two sensors side by side are an opening");
     }
 
     fn scan_of_16<'a>(
