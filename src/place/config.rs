@@ -65,8 +65,9 @@ impl PlaceConfig {
 
     /// The settings for a ring of 4 to 128 sensors.
     ///
-    /// `live_sensors_min` is three eighths of the sensors, at least 3: 6 of 16. `separation_mrad` is the default, or 640 mrad
-    /// of beam plus the largest gap between neighbouring bearings if that is more. All other settings are the defaults.
+    /// `live_sensors_min` is three eighths of the sensors, at least 3: 6 of 16. `separation_mrad` is the default, or 1.6 times the mean
+    /// gap between neighbouring bearings without the largest gap if that is more: up to three sensors side by side measure one wall, and
+    /// noise decides which of them measure about the same. All other settings are the defaults.
     /// Cost: O(SONARS²).
     ///
     /// ```
@@ -75,13 +76,13 @@ impl PlaceConfig {
     ///
     /// assert_eq!(PlaceConfig::for_ring(&RingGeometry::<16>::even()), PlaceConfig::DEFAULT);
     /// let eight = PlaceConfig::for_ring(&RingGeometry::<8>::even());
-    /// assert_eq!((eight.live_sensors_min, eight.separation_mrad), (3, 1426));
+    /// assert_eq!((eight.live_sensors_min, eight.separation_mrad), (3, 1256));
     /// ```
     #[must_use]
     pub const fn for_ring<const SONARS: usize>(geometry: &RingGeometry<SONARS>) -> Self {
-        const BEAM_MRAD: i32 = 640;
         let live = SONARS * 3 / 8;
-        let separation_mrad = BEAM_MRAD + geometry.largest_gap_mrad();
+        let gaps = if SONARS > 1 { SONARS as i32 - 1 } else { 1 };
+        let separation_mrad = (6283 - geometry.largest_gap_mrad()) / gaps * 8 / 5;
         let separation_mrad = if separation_mrad > 2094 { 2094 } else { separation_mrad as u16 };
         let default = Self::DEFAULT;
         Self {

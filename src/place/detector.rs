@@ -20,6 +20,10 @@ const AVERAGED_FRAMES: usize = 8;
 const AVERAGED_SPREAD_MM: u16 = 30;
 /// A door is an opening of a place when at least this many sightings show it: a sensor looks through only while it is in front.
 const DOOR_SIGHTINGS: u8 = 3;
+/// Where the sonars miss more echoes than this share, in thousandths, silence is less certain,
+const MISSED_PERMILLE: u16 = 80;
+/// and one more sighting is needed for this share more.
+const MISSED_PERMILLE_PER_SIGHTING: u16 = 14;
 /// A place that is one only because a sensor looks through a door needs this many sightings: silence may be a missed echo.
 const DOOR_CONFIRM_SIGHTINGS: u8 = 8;
 
@@ -99,7 +103,7 @@ pub struct PlaceDetector<const SONARS: usize> {
     /// `turned_mrad` in the first of them.
     first_turned_mrad: i16,
     came_by: CameBy,
-    /// The doors in the sightings, with bearings at the start.
+    /// The doors in the sightings, with bearings at the start. In a ring with wide gaps between the sensors all openings are seen as doors are.
     doors: MergedOpenings,
     /// Frames that contradict the present state minus frames that confirm it, at least 0.
     contrary_frames: u8,
@@ -315,15 +319,20 @@ impl<const SONARS: usize> PlaceDetector<SONARS> {
             self.sightings = self.sightings.saturating_add(1);
             self.door_sightings = self.door_sightings.saturating_add(obstacles.is_at_door().into());
             self.contrary_frames = self.contrary_frames.saturating_sub(1);
-            let doors = self.scan().narrow_openings(obstacles);
-            self.doors.add(&doors, turn_mrad(self.turned_mrad, 0));
+            let scan = self.scan();
+            let doors =
+                if scan.has_wide_gaps() { sighting.meet_point.openings } else { scan.narrow_openings(obstacles) };
+            let same_mrad = Openings::same_mrad(self.scan().spacing_mrad());
+            self.doors.add(&doors, turn_mrad(self.turned_mrad, 0), same_mrad);
             self.insert(sighting);
         } else if self.sightings > 0 {
             self.contrary_frames = self.contrary_frames.saturating_add(1);
         }
         let is_over = self.contrary_frames >= self.config.leave_frames;
+        let confirm_sightings =
+            DOOR_CONFIRM_SIGHTINGS.saturating_add(self.doubtful_sightings()).max(self.config.confirm_frames);
         let is_confirmed = self.sightings.saturating_sub(self.door_sightings) >= self.config.confirm_frames
-            || self.sightings >= DOOR_CONFIRM_SIGHTINGS.max(self.config.confirm_frames);
+            || self.sightings >= confirm_sightings;
         if !is_confirmed {
             if is_over {
                 self.forget_sightings();
@@ -337,6 +346,12 @@ impl<const SONARS: usize> PlaceDetector<SONARS> {
         self.is_at_place = true;
         self.forget_sightings();
         place
+    }
+
+    /// The sightings of a door that are needed in addition where the sonars miss many echoes.
+    fn doubtful_sightings(&self) -> u8 {
+        let more_permille = self.smoother.missed_permille().saturating_sub(MISSED_PERMILLE);
+        (more_permille / MISSED_PERMILLE_PER_SIGHTING).min(u8::MAX.into()) as u8
     }
 
     /// Inserts a sighting into the best ones, in ascending order of spread. A sighting that is displaced goes behind those of its
@@ -374,16 +389,17 @@ impl<const SONARS: usize> PlaceDetector<SONARS> {
             self.faults.record(FaultKind::RadiusOutOfRange);
             return None;
         };
+        let same_mrad = Openings::same_mrad(self.scan().spacing_mrad());
         let mut ways = MergedOpenings::new();
         close.for_each(|sighting| {
-            ways.add(&sighting.meet_point.openings, turn_mrad(sighting.turned_mrad, self.turned_mrad));
+            ways.add(&sighting.meet_point.openings, turn_mrad(sighting.turned_mrad, self.turned_mrad), same_mrad);
         });
         let mut ways = ways.agreed();
         let mut degree = degree;
-        let doors = self.doors.shown_by(DOOR_SIGHTINGS);
+        let doors = self.doors.shown_by(DOOR_SIGHTINGS.saturating_add(self.doubtful_sightings()));
         for &bearing_mrad in doors.bearings_mrad() {
             let bearing_mrad = rotated(bearing_mrad, self.turned_mrad.into());
-            ways.insert(bearing_mrad);
+            ways.insert(bearing_mrad, same_mrad);
         }
         if doors.count() > 0 {
             degree = Some(ways.count());

@@ -13,6 +13,9 @@ const OPEN_PERCENT: u32 = 160;
 /// The corners beside a wall that ends an opening are nearer than this percentage of the radius.
 const FAR_PERCENT: u32 = 220;
 
+/// The sensors that look into an opening between two obstacles `separation_mrad` apart are at this many bearings or more, in milliradians: a single
+/// sensor of a dense ring may miss both a wall and its corner.
+const LEAST_OPEN_MRAD: i32 = 300;
 /// Openings of two scans within this angle are the same, in milliradians.
 const SAME_OPENING_MRAD: i32 = 500;
 /// The most different openings of the merged scans.
@@ -38,9 +41,16 @@ impl Openings {
         self.bearings_mrad.as_slice()
     }
 
+    /// The angle within which the openings of two scans of a ring with this angle between two sensors are the same: at least this,
+    /// because an opening may be one sensor aside in the next scan.
+    pub(super) const fn same_mrad(spacing_mrad: u16) -> i32 {
+        let most_mrad = spacing_mrad as i32;
+        if most_mrad > SAME_OPENING_MRAD { most_mrad } else { SAME_OPENING_MRAD }
+    }
+
     /// Inserts an opening that is none of those present.
-    pub(super) fn insert(&mut self, bearing_mrad: i16) {
-        if self.nearest(bearing_mrad, SAME_OPENING_MRAD as u16).is_none() {
+    pub(super) fn insert(&mut self, bearing_mrad: i16, same_mrad: i32) {
+        if self.nearest(bearing_mrad, same_mrad as u16).is_none() {
             self.bearings_mrad.insert(bearing_mrad, |one, other| one <= other);
         }
     }
@@ -67,13 +77,13 @@ impl MergedOpenings {
         Self { openings: [(0, 0); MERGED_MAX], scans: 0 }
     }
 
-    /// Adds the openings of a scan, rotated by `by_mrad`.
-    pub(super) fn add(&mut self, openings: &Openings, by_mrad: i32) {
+    /// Adds the openings of a scan, rotated by `by_mrad`. Those within `same_mrad` of each other are one.
+    pub(super) fn add(&mut self, openings: &Openings, by_mrad: i32, same_mrad: i32) {
         self.scans = self.scans.saturating_add(1);
         for &bearing_mrad in openings.bearings_mrad() {
             let bearing_mrad = rotated(bearing_mrad, by_mrad);
             let is_same = |&&mut (mean_mrad, scans): &&mut (i16, u8)| {
-                scans == 0 || turn_mrad(mean_mrad, bearing_mrad).abs() <= SAME_OPENING_MRAD
+                scans == 0 || turn_mrad(mean_mrad, bearing_mrad).abs() <= same_mrad
             };
             if let Some((mean_mrad, scans)) = self.openings.iter_mut().find(is_same) {
                 let weight = i32::from(*scans) + 1;
@@ -151,7 +161,9 @@ impl<const SONARS: usize> RingScan<'_, SONARS> {
             let is_wall = inside().any(|(range_mm, within_mrad)| {
                 sensors.first_mrad < within_mrad && within_mrad < sensors.last_mrad && !is_open(range_mm, radius_mm)
             });
-            let is_closed = is_wall && !sensors.is_far;
+            let open_mrad = sensors.count.saturating_mul(self.spacing_mrad().into());
+            let is_lone = self.separates(gap_mrad) && open_mrad < LEAST_OPEN_MRAD;
+            let is_closed = is_lone || is_wall && !sensors.is_far;
             let middle_mrad = sensors.sum_mrad.checked_div(if is_closed { 0 } else { sensors.count });
             let middle_mrad = middle_mrad.or_else(|| inside_mrad(self.came_by_mrad?));
             if let Some(middle_mrad) = middle_mrad {

@@ -11,30 +11,59 @@ const AGREE_MM: u16 = 200;
 /// Range of a sensor that received no echo.
 pub(super) const SILENT_MM: u16 = u16::MAX;
 
-/// The ranges of the three frames before the newest one; all zero at the start.
+/// Each echo between two that agree moves the share of the missed ones by one part in this many.
+const MISSED_WEIGHT: i32 = 1 << 10;
+
+/// The earlier frames that a range is smoothed with.
+const EARLIER: usize = 5;
+/// Sonars that miss more than this share of the echoes, in thousandths, are smoothed over six frames instead of four.
+const MANY_MISSED_PERMILLE: u16 = 80;
+
+/// The ranges of the frames before the newest one, and the share of the echoes that the sonars miss; all zero at the start.
 #[derive(Clone, Debug)]
 pub(super) struct RangeSmoother<const SONARS: usize> {
-    earlier_mm: [[u16; SONARS]; 3],
+    earlier_mm: [[u16; SONARS]; EARLIER],
+    /// The share of the echoes between two that agree which are missed or do not agree with them, in parts of 2²⁴.
+    missed: i32,
 }
 
 impl<const SONARS: usize> RangeSmoother<SONARS> {
     pub(super) const fn new() -> Self {
-        Self { earlier_mm: [[DEAD_MM; SONARS]; 3] }
+        Self { earlier_mm: [[DEAD_MM; SONARS]; EARLIER], missed: 0 }
     }
 
     pub(super) fn clear(&mut self) {
-        self.earlier_mm = [[DEAD_MM; SONARS]; 3];
+        *self = Self::new();
+    }
+
+    /// The share of the echoes that the sonars miss, in thousandths: silence, or another range, between two ranges that agree.
+    pub(super) const fn missed_permille(&self) -> u16 {
+        (((self.missed >> 14) * 1000) >> 10) as u16
     }
 
     /// Takes the ranges of the next frame and returns them smoothed. Time `O(SONARS)`.
     #[inline(never)]
     pub(super) fn update(&mut self, now_mm: [u16; SONARS]) -> [u16; SONARS] {
-        let [before_mm, long_before_mm, first_mm] = self.earlier_mm;
-        self.earlier_mm = [now_mm, before_mm, long_before_mm];
+        let earlier_mm = self.earlier_mm;
+        let [before_mm, long_before_mm, third_mm, fourth_mm, fifth_mm] = earlier_mm;
+        self.earlier_mm = [now_mm, before_mm, long_before_mm, third_mm, fourth_mm];
+        let misses_many = self.missed_permille() > MANY_MISSED_PERMILLE;
         let mut smooth_mm = now_mm;
-        let earlier_mm = before_mm.into_iter().zip(long_before_mm).zip(first_mm);
-        for (smooth_mm, ((before_mm, long_before_mm), first_mm)) in smooth_mm.iter_mut().zip(earlier_mm) {
-            *smooth_mm = smoothed([*smooth_mm, before_mm, long_before_mm, first_mm]);
+        let earlier_mm = before_mm.into_iter().zip(long_before_mm).zip(third_mm);
+        let oldest_mm = fourth_mm.into_iter().zip(fifth_mm);
+        let earlier_mm = earlier_mm.zip(oldest_mm);
+        for (smooth_mm, (((before_mm, long_before_mm), third_mm), (fourth_mm, fifth_mm))) in
+            smooth_mm.iter_mut().zip(earlier_mm)
+        {
+            let now_mm = *smooth_mm;
+            if agree(now_mm, long_before_mm) && before_mm != DEAD_MM {
+                let is_missed = !agree(now_mm, before_mm);
+                self.missed += (if is_missed { (1 << 24) - self.missed } else { -self.missed }) / MISSED_WEIGHT;
+            }
+            *smooth_mm = smoothed([now_mm, before_mm, long_before_mm, third_mm]);
+            if misses_many && *smooth_mm == SILENT_MM {
+                *smooth_mm = repeated([now_mm, before_mm, long_before_mm, third_mm, fourth_mm, fifth_mm]);
+            }
         }
         smooth_mm
     }
@@ -84,6 +113,18 @@ fn smoothed(frames_mm: [u16; 4]) -> u16 {
             }
         }
     }
+}
+
+/// The newest of two echoes that agree, or silence.
+fn repeated(frames_mm: [u16; 6]) -> u16 {
+    let mut rest = frames_mm.as_slice();
+    while let [newest_mm, older_mm @ ..] = rest {
+        if older_mm.iter().any(|range_mm| agree(*newest_mm, *range_mm)) {
+            return *newest_mm;
+        }
+        rest = older_mm;
+    }
+    SILENT_MM
 }
 
 /// Gives each dead sensor the mean range of its two neighbours, where both receive echoes from about the same range: a wall
@@ -147,5 +188,32 @@ mod tests {
         assert_eq!(smooth([900, DEAD_MM, DEAD_MM, DEAD_MM]), DEAD_MM);
         assert_eq!(smooth([900, DEAD_MM, DEAD_MM, SILENT_MM]), SILENT_MM);
         assert_eq!(smooth([DEAD_MM, DEAD_MM, DEAD_MM, 900]), 900);
+    }
+
+    /// Updates a smoother of one sensor with the same range, missed in some frames; returns the smoothed ranges.
+    fn update(smoother: &mut RangeSmoother<1>, frames: usize, is_missed: impl Fn(usize) -> bool) -> Vec<u16> {
+        (0..frames).map(|frame| smoother.update([if is_missed(frame) { SILENT_MM } else { 900 }])[0]).collect()
+    }
+
+    #[test]
+    fn the_share_of_missed_echoes_is_measured() {
+        let mut smoother = RangeSmoother::new();
+        update(&mut smoother, 9000, |_| false);
+        assert_eq!(smoother.missed_permille(), 0);
+        update(&mut smoother, 9000, |frame| frame % 5 == 0);
+        // Of five frames, three are between two echoes, and one of these is missed.
+        assert!((300..=340).contains(&smoother.missed_permille()), "{}", smoother.missed_permille());
+        update(&mut smoother, 9000, |_| true);
+        assert!((300..=340).contains(&smoother.missed_permille()), "silence alone is no missed echo");
+    }
+
+    #[test]
+    fn sonars_that_miss_many_echoes_keep_a_range_for_longer() {
+        let mut smoother = RangeSmoother::new();
+        // Four successive frames are missed.
+        let is_missed = |frame| [4, 5, 6, 7].contains(&frame);
+        assert!(update(&mut smoother, 9, is_missed).contains(&SILENT_MM));
+        update(&mut smoother, 2000, |frame| frame % 5 == 0);
+        assert!(!update(&mut smoother, 9, is_missed).contains(&SILENT_MM));
     }
 }
