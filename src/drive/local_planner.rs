@@ -13,12 +13,15 @@ use crate::config_error::ConfigError;
 use crate::fault::{FaultCounters, FaultKind};
 use crate::filter::Passage;
 use crate::place::{Obstacles, Openings};
+use crate::ring::Echo;
 use crate::top_k::TopK;
 
 /// An opening is matched to the one of the frame before when its bearing changed by at most this, in milliradians.
 const SAME_OPENING_MRAD: u16 = 700;
 /// The same in a frame that shows another number of openings.
 const DOUBTFUL_OPENING_MRAD: u16 = 350;
+/// The angle between two sensors up to which the robot keeps to the edge by the smallest distance, in milliradians: that of 16 sensors.
+const SPACING_MRAD: u16 = 392;
 /// Limit of the heading of a turn in place, in milliradians: with the default wheels the ring turns by 72 mrad per frame, so that the
 /// smoothed ranges of a sensor are from one direction.
 const TURN_MRAD: i16 = 300;
@@ -35,6 +38,8 @@ const BACK_MRAD: i32 = 400;
 /// After this many frames it drives out where the exit must be. A robot that follows the wall of a hall leaves a meet point that the detector
 /// has not confirmed in this time, and approaches none for the same time.
 const SEARCH_FRAMES: u16 = 24;
+/// A robot gives up a meet point that the detector does not see after this many frames, and follows the edge.
+const MOST_APPROACH_FRAMES: u16 = 60;
 /// For this many frames after departing the robot still counts as at the place: an obstacle that is hidden for a moment
 /// must not make another place.
 const DEPART_FRAMES: u16 = 8;
@@ -68,6 +73,27 @@ pub(super) type Exits = TopK<u16, { Obstacles::MAX }>;
 
 /// The largest bearing relative to another, in milliradians.
 const MAX_RELATIVE_MRAD: i32 = 6282;
+
+/// The tolerance of a bearing, which is at least the angle between two sensors: an obstacle may move by one of them between two frames.
+fn tolerance_mrad<const SONARS: usize>(frame: &Frame<'_, SONARS>, least_mrad: u16) -> u16 {
+    least_mrad.max((frame.scan.spacing_mrad() / 8).saturating_mul(7))
+}
+
+/// Whether an obstacle may be in front of a dead sensor. With those ahead dead the robot sways, which shows it.
+fn has_dead_sensors<const SONARS: usize>(frame: &Frame<'_, SONARS>) -> bool {
+    !frame.is_blind_ahead() && frame.scan.echoes().any(|(echo, _)| echo == Echo::Dead)
+}
+
+/// The spread at which an approach begins: the wider the gaps between live sensors, the farther is the robot from the edge, and the fewer
+/// frames show the third obstacle.
+fn approach_mm<const SONARS: usize>(frame: &Frame<'_, SONARS>) -> u16 {
+    let spacing_mrad = (frame.scan.spacing_mrad() << u16::from(has_dead_sensors(frame))).max(SPACING_MRAD);
+    let share = u32::from(frame.scan.equidistance_mm()) * u32::from(spacing_mrad) / u32::from(SPACING_MRAD);
+    share.min(u16::MAX.into()) as u16
+}
+
+/// Straight aside, in milliradians.
+const QUARTER_MRAD: i32 = 1571;
 
 /// A state machine with one step for each ring frame. Memory: some 60 bytes.
 #[derive(Clone, Debug)]
@@ -253,10 +279,10 @@ impl LocalPlanner {
 
     fn follow_edge<const SONARS: usize>(&mut self, frame: &Frame<'_, SONARS>, is_at_place: bool) -> VelocityCommand {
         let is_refused = self.hall.is_followed() && self.frames < SEARCH_FRAMES;
-        if !is_refused
-            && !is_at_place
-            && frame.obstacles.spread_mm().is_some_and(|spread_mm| spread_mm <= frame.scan.equidistance_mm())
-        {
+        // It has not just left a place, or a meet point that the detector does not see.
+        let is_under_way = self.frames > SEARCH_FRAMES;
+        let limit_mm = if is_under_way { approach_mm(frame) } else { frame.scan.equidistance_mm() };
+        if !is_refused && !is_at_place && frame.obstacles.spread_mm().is_some_and(|spread_mm| spread_mm <= limit_mm) {
             // The rotation of this frame is applied to it as to that of any other.
             self.entry_mrad = rotated(HALF_TURN_MRAD, -frame.rotation_mrad);
             self.enter(DriveState::Approach);
@@ -279,10 +305,22 @@ impl LocalPlanner {
         if self.is_timed_out() {
             return self.give_up(frame);
         }
-        let limit_mm = frame.scan.equidistance_mm().saturating_mul(2);
+        let limit_mm = approach_mm(frame).saturating_mul(2);
         // In the corner of a hall an echo at a flat angle may look like a third wall. The detector does not confirm it.
         let is_refused = self.hall.is_followed() && self.frames > SEARCH_FRAMES;
-        if is_refused || frame.obstacles.spread_mm().is_some_and(|spread_mm| spread_mm > limit_mm) {
+        let is_hidden = frame.obstacles.spread_mm().is_some_and(|spread_mm| spread_mm > limit_mm);
+        if is_hidden && !is_refused && has_dead_sensors(frame) && self.frames < SEARCH_FRAMES {
+            return VelocityCommand { heading_mrad: look_round_mrad(frame, self.frames), speed_permille: 0 };
+        }
+        if is_refused || is_hidden {
+            self.enter(DriveState::FollowEdge);
+            return self.follow_edge(frame, false);
+        }
+        // Where an approach begins no earlier than the detector sees the meet point, it waits for the detector.
+        let seen_mm = frame.scan.equidistance_mm();
+        let is_seen =
+            approach_mm(frame) <= seen_mm || frame.obstacles.spread_mm().is_some_and(|spread_mm| spread_mm <= seen_mm);
+        if !is_seen && self.frames > MOST_APPROACH_FRAMES {
             self.enter(DriveState::FollowEdge);
             return self.follow_edge(frame, false);
         }
@@ -290,9 +328,10 @@ impl LocalPlanner {
         match meet_point_offset_mm(&frame.obstacles) {
             Some(offset) if offset.length() > i32::from(self.config.arrival_tolerance_mm) => {
                 let heading_mrad = offset.bearing_mrad();
-                // A meet point behind has been passed, and a turn towards it would lose the bearing of the entry.
-                if i32::from(heading_mrad).abs() > 1571 {
-                    return VelocityCommand::STOP;
+                // A meet point behind has been passed. The detector reports it, or the robot turns back to it.
+                if i32::from(heading_mrad).abs() > QUARTER_MRAD {
+                    let heading_mrad = if is_seen { 0 } else { heading_mrad.clamp(-TURN_MRAD, TURN_MRAD) };
+                    return VelocityCommand { heading_mrad, speed_permille: 0 };
                 }
                 let distance_mm = offset.length().clamp(0, u16::MAX.into()) as u16;
                 VelocityCommand { heading_mrad, speed_permille: speed_permille_at(&self.config, distance_mm) }
@@ -303,7 +342,7 @@ impl LocalPlanner {
             }
             // A sensor looks through a door: it would not, turned by a few degrees.
             _ if frame.obstacles.is_at_door() => VelocityCommand::STOP,
-            _ => VelocityCommand { heading_mrad: look_round_mrad(self.frames), speed_permille: 0 },
+            _ => VelocityCommand { heading_mrad: look_round_mrad(frame, self.frames), speed_permille: 0 },
         }
     }
 
@@ -365,7 +404,7 @@ impl LocalPlanner {
         let within_mrad = match usize::from(openings.count()) {
             1 if count == 1 => HALF_TURN_MRAD as u16,
             seen if seen == count => SAME_OPENING_MRAD,
-            _ => DOUBTFUL_OPENING_MRAD,
+            _ => tolerance_mrad(frame, DOUBTFUL_OPENING_MRAD),
         };
         let seen = openings.nearest(expected_mrad, within_mrad);
         let target_mrad = seen.map_or(expected_mrad, |(_, target_mrad)| target_mrad);
@@ -391,7 +430,7 @@ impl LocalPlanner {
                 return self.depart(frame, true);
             }
             self.search_frames += 1;
-            return VelocityCommand { heading_mrad: look_round_mrad(self.search_frames), speed_permille: 0 };
+            return VelocityCommand { heading_mrad: look_round_mrad(frame, self.search_frames), speed_permille: 0 };
         }
         VelocityCommand { heading_mrad: self.target_mrad.clamp(-TURN_MRAD, TURN_MRAD), speed_permille: 0 }
     }
@@ -410,10 +449,11 @@ impl LocalPlanner {
         }
         // At a crossing, a sensor that should measure the obstacle beside the exit may measure the next one.
         let expected_mrad = rotated(self.target_mrad, if self.frames > 0 { frame.rotation_mrad } else { 0 });
-        let seen = frame.scan.openings(&frame.obstacles).nearest(expected_mrad, EXIT_MRAD);
+        let within_mrad = tolerance_mrad(frame, EXIT_MRAD);
+        let seen = frame.scan.openings(&frame.obstacles).nearest(expected_mrad, within_mrad);
         self.target_mrad = seen.map_or(expected_mrad, |(_, target_mrad)| target_mrad);
-        let is_wide =
-            seen.is_some() && frame.scan.narrow_openings(&frame.obstacles).nearest(expected_mrad, EXIT_MRAD).is_none();
+        let is_wide = seen.is_some()
+            && frame.scan.narrow_openings(&frame.obstacles).nearest(expected_mrad, within_mrad).is_none();
         let sector = if is_wide { Sector::EXIT } else { Sector::DOOR };
         self.drive(frame, sector, None, Some(self.target_mrad))
     }

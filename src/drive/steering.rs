@@ -10,8 +10,8 @@ const ASIDE_MRAD: i16 = 200;
 const SWAY_MRAD: i16 = 260;
 /// for this number of frames each; a power of two.
 const SWAY_FRAMES: u16 = 8;
-/// A robot that looks for a narrow gap turns towards this bearing on either side, in milliradians,
-const LOOK_ROUND_MRAD: i16 = 180;
+/// A robot that looks for a narrow gap turns towards a bearing on either side, this percentage of the angle between two sensors,
+const LOOK_ROUND_PERCENT: u16 = 46;
 /// for this number of frames each; a power of two.
 const LOOK_ROUND_FRAMES: u16 = 8;
 /// Limit of the heading along an edge, in milliradians: an edge is smooth, and an intermittent echo must not turn the robot
@@ -55,8 +55,9 @@ pub(super) fn speed_permille_at(config: &DriveConfig, distance_mm: u16) -> u16 {
 }
 
 /// Turns to either side by half the angle between two sensors, so that one of them looks through a narrow gap.
-pub(super) const fn look_round_mrad(frames: u16) -> i16 {
-    if (frames + LOOK_ROUND_FRAMES / 2) & LOOK_ROUND_FRAMES == 0 { LOOK_ROUND_MRAD } else { -LOOK_ROUND_MRAD }
+pub(super) fn look_round_mrad<const SONARS: usize>(frame: &Frame<'_, SONARS>, frames: u16) -> i16 {
+    let aside_mrad = (frame.scan.spacing_mrad().saturating_mul(LOOK_ROUND_PERCENT) / 100) as i16;
+    if (frames + LOOK_ROUND_FRAMES / 2) & LOOK_ROUND_FRAMES == 0 { aside_mrad } else { -aside_mrad }
 }
 
 /// With the sensors ahead dead, a swaying robot measures the range ahead with those beside them.
