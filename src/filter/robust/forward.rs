@@ -70,14 +70,14 @@ impl<const V: usize> Forward<V> {
             before: None,
             earlier: None,
         };
-        let Some((column, cells, _)) =
+        let Some((column, cells, rows)) =
             lattice.walk(&mut sum, (model, history, hmm), VertexSet32::ALL, hypothesis.before)
         else {
             return 0.0;
         };
         self.belief.fill(0.0);
         for (slot, state) in column.iter() {
-            self.belief[state.vertex] = cells.0.iter().map(|row| row[slot]).sum();
+            self.belief[state.vertex] = Slot::first(rows).map(|row| cells[row][slot]).sum();
         }
         (sum.ln_all + libm::logf(sum.scale) - sum.ln_path).max(0.0)
     }
@@ -181,6 +181,25 @@ impl<const V: usize> Semiring for AllPaths<'_, V> {
             return None;
         }
         Some(exit * self.weights[slot] * (on * (sum - returning) + turn * returning))
+    }
+
+    fn advance(&mut self, _: &Stage, (here, paths): (&Column, &PerSlot<f32>), there: &Column, next: &mut PerSlot<f32>) {
+        self.ln_path += self.before.map_or(0.0, |before| self.hmm.ln_exit(before));
+        let mut leaving = PerSlot([0.0; WIDTH]);
+        for (slot, from) in here.iter() {
+            leaving[slot] = paths[slot] * self.hmm.exit(from.vertex);
+        }
+        for (slot, to) in there.iter() {
+            let neighbours = self.hmm.neighbours(to.vertex);
+            let mut sum = 0.0;
+            for (from, state) in here.iter() {
+                if neighbours.contains(state.vertex) {
+                    sum += leaving[from];
+                }
+            }
+            next[slot] = sum * self.weights[slot];
+            self.total += next[slot];
+        }
     }
 
     fn add(&mut self, cell: &mut f32, value: f32, _: Slot, _: Slot) {

@@ -1,6 +1,6 @@
 //! A hypothesis as a hidden Markov model: the emission of each vertex and the transitions between vertices.
 
-use super::column::Column;
+use super::column::{Column, Slot};
 use super::history::{ObservationHistory, PackedObservation};
 use super::hypothesis::Hypothesis;
 use super::model::{Model, SHAPE};
@@ -115,6 +115,16 @@ impl<const V: usize> Hmm<V> {
         }
     }
 
+    /// The neighbours of a vertex along edges that were driven more than once. A vertex is not its own neighbour.
+    pub(super) fn established(&self, vertex: VertexId) -> VertexSet32 {
+        self.established[vertex] - VertexSet32::from(vertex)
+    }
+
+    /// The neighbours of a vertex.
+    pub(super) fn neighbours(&self, vertex: VertexId) -> VertexSet32 {
+        self.neighbours[vertex]
+    }
+
     /// Whether an edge joins two vertices that was driven more than once.
     pub(super) fn is_established(&self, from: VertexId, to: VertexId) -> bool {
         self.established[from].contains(to)
@@ -154,11 +164,25 @@ impl<const V: usize> Hmm<V> {
         allowed: VertexSet32,
         column: &mut Column,
     ) {
-        column.clear();
-        for vertex in VertexId::first(self.vertices.into()).filter(|&vertex| allowed.contains(vertex)) {
+        let vertices = VertexId::first(self.vertices.into()).filter(|&vertex| allowed.contains(vertex));
+        let mut ln_emissions = PerVertex::<f32, V>::filled(f32::NEG_INFINITY);
+        let mut best = f32::NEG_INFINITY;
+        for vertex in vertices.clone() {
             let ln_emission = self.ln_emission(model, vertex, observation);
+            ln_emissions[vertex] = ln_emission;
+            if ln_emission > best {
+                best = ln_emission;
+            }
+        }
+        column.clear();
+        for vertex in vertices.clone().filter(|&vertex| ln_emissions[vertex] >= best - REACH) {
+            column.insert(vertex, ln_emissions[vertex]);
+        }
+        if column.len() == 1 {
             // Two stay in any case: no path stays at a vertex, so one alone would lead nowhere.
-            if column.len() < 2 || ln_emission >= column.best() - REACH {
+            let only = column.vertex(Slot::FIRST);
+            let others = vertices.filter(|&vertex| Some(vertex) != only).map(|vertex| (vertex, ln_emissions[vertex]));
+            if let Some((vertex, ln_emission)) = others.reduce(|one, other| if other.1 > one.1 { other } else { one }) {
                 column.insert(vertex, ln_emission);
             }
         }

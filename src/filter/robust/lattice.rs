@@ -72,6 +72,10 @@ pub(super) trait Semiring {
         to: (Slot, &State),
     ) -> Option<f32>;
 
+    /// The values of all paths to each slot of a column, from those to each slot of the column before, where no turn hint
+    /// speaks of the transition nor of the next one: the same as by [`Semiring::transition`], for the row of all pairs.
+    fn advance(&mut self, stage: &Stage, before: (&Column, &PerSlot<f32>), to: &Column, next: &mut PerSlot<f32>);
+
     /// Adds the value of paths from a slot to those of a cell.
     fn add(&mut self, cell: &mut f32, value: f32, from: Slot, to: Slot);
 
@@ -105,25 +109,27 @@ impl Lattice {
         before: Option<VertexId>,
     ) -> Option<(Column, &Cells, usize)> {
         let mut columns = [Column::EMPTY; 3];
-        let [cells, next] = &mut self.cells;
+        let [mut earlier, mut here, mut there] = columns.each_mut();
+        let [mut cells, mut next] = self.cells.each_mut();
         let mut rows = 0;
         let mut is_second = false;
         for (index, observation) in history.iter().enumerate() {
-            let [earlier, here, there] = &mut columns;
             let starts = observation.starts_sequence() || index == 0;
             let is_first_order = history.is_first_order(index);
             let stage = Stage { index, observation, starts, is_second };
             hmm.fill(model, observation, allowed, there);
             semiring.enter(&stage, there);
-            *next = self::cells(S::ZERO);
+            let hint = if is_second { None } else { observation.exit() };
             if starts {
                 let closed = semiring.close(&stage, here, cells, rows);
                 let from = if observation.starts_sequence() { None } else { before };
                 for (slot, state) in there.iter() {
                     next[Slot::FIRST][slot] = semiring.start(closed, from, slot, state);
                 }
+            } else if is_first_order && hint.is_none() && rows == 1 {
+                semiring.advance(&stage, (here, &cells[Slot::FIRST]), there, &mut next[Slot::FIRST]);
             } else {
-                let hint = if is_second { None } else { observation.exit() };
+                *next = self::cells(S::ZERO);
                 let turns = semiring.turns(hint);
                 // Where the paths come from that turn back to a vertex.
                 let mut back = PerSlot([None; WIDTH]);
@@ -149,9 +155,9 @@ impl Lattice {
             rows = if starts || is_first_order { 1 } else { here.len() };
             semiring.finish(&stage, next, rows)?;
             is_second = starts;
-            core::mem::swap(cells, next);
-            columns.rotate_left(1);
+            (cells, next) = (next, cells);
+            (earlier, here, there) = (here, there, earlier);
         }
-        Some((columns[1], cells, rows))
+        Some((*here, cells, rows))
     }
 }

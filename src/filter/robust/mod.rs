@@ -270,7 +270,7 @@ impl<const N: usize, const V: usize, const HISTORY: usize> Filter<V> for RobustF
         self.step(observation.into())
     }
 
-    /// Makes one proposal, or a step of a fold. Cost: at most seven passes over the history, or 1500 merges of two nodes.
+    /// Makes one proposal, or a step of a fold. Cost: at most two decodings and a forward pass over the history, or 1500 merges of two nodes.
     fn refine(&mut self) {
         if self.localise_only || self.history.len() < 3 {
             return;
@@ -286,6 +286,7 @@ impl<const N: usize, const V: usize, const HISTORY: usize> Filter<V> for RobustF
             forward: &mut self.forward,
             random: &mut random,
             threshold: self.beam.threshold(wanted),
+            decodings: 0,
         };
         // The best hypothesis every other time, else one of the better ones.
         let rank = if self.refinements.is_multiple_of(2) {

@@ -12,8 +12,8 @@ use crate::map::{VertexId, VertexSet32};
 use rand_core::Rng;
 use rand_xoshiro::Xoshiro128PlusPlus;
 
-/// How often a proposal is decoded again, as long as that improves it.
-const DECODINGS: usize = 2;
+/// How often a step decodes: the decoding of the proposal itself, if it has one, then others as long as they improve it.
+const DECODINGS: u8 = 2;
 
 /// A proposal that is this far below the worst hypothesis is dropped before the bound of its other paths is updated, in nats.
 const SLACK: f32 = 6.0;
@@ -29,6 +29,8 @@ pub(super) struct Proposals<'a, const V: usize, const T: usize> {
     pub(super) random: &'a mut Xoshiro128PlusPlus,
     /// The score that a proposal must exceed.
     pub(super) threshold: f32,
+    /// How often this step has decoded.
+    pub(super) decodings: u8,
 }
 
 impl<const V: usize, const T: usize> Proposals<'_, V, T> {
@@ -70,11 +72,7 @@ impl<const V: usize, const T: usize> Proposals<'_, V, T> {
     pub(super) fn finish(&mut self, hypothesis: &mut Hypothesis<V, T>) -> bool {
         // The bound of the other paths stays until it is updated.
         hypothesis.rebuild(self.model, self.history);
-        for _ in 0..DECODINGS {
-            if !self.improve_path(hypothesis) {
-                break;
-            }
-        }
+        while self.decodings < DECODINGS && self.improve_path(hypothesis) {}
         if hypothesis.score() + SLACK < self.threshold {
             return false;
         }
@@ -98,6 +96,9 @@ impl<const V: usize, const T: usize> Proposals<'_, V, T> {
         let before = hypothesis.evidence;
         let path = hypothesis.path;
         self.decode(hypothesis, VertexSet32::ALL, false);
+        if hypothesis.path == path {
+            return false;
+        }
         hypothesis.rebuild(self.model, self.history);
         if hypothesis.evidence > before {
             return true;
@@ -109,6 +110,7 @@ impl<const V: usize, const T: usize> Proposals<'_, V, T> {
 
     /// Finds the best path through some of the vertices, or, `perturbed`, draws one.
     pub(super) fn decode(&mut self, hypothesis: &mut Hypothesis<V, T>, allowed: VertexSet32, perturbed: bool) {
+        self.decodings += 1;
         self.hmm.read(self.model, self.history, hypothesis, Emissions::Predictive);
         let noise = if perturbed { Some(&mut *self.random) } else { None };
         self.viterbi.decode(self.lattice, (self.model, self.history, self.hmm), allowed, noise, hypothesis);

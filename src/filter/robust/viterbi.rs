@@ -242,6 +242,42 @@ impl<const V: usize> Semiring for BestPath<'_, V> {
         Some(returning.max(straight) + self.ln_transition(ln_exit, from.vertex, to.vertex) + to.ln_emission)
     }
 
+    fn advance(
+        &mut self,
+        stage: &Stage,
+        (here, paths): (&Column, &PerSlot<f32>),
+        there: &Column,
+        next: &mut PerSlot<f32>,
+    ) {
+        const NONE: (f32, Slot) = (f32::NEG_INFINITY, Slot::FIRST);
+        let mut leaving = PerSlot([f32::NEG_INFINITY; WIDTH]);
+        let (mut best, mut second) = (NONE, NONE);
+        for (slot, from) in here.iter() {
+            let value = paths[slot] + self.hmm.ln_exit(from.vertex);
+            leaving[slot] = value;
+            if value > best.0 {
+                (best, second) = ((value, slot), best);
+            } else if value > second.0 {
+                second = (value, slot);
+            }
+            let origin = self.origins[slot];
+            self.note(stage.index.wrapping_sub(1), slot, Back { best: origin, second: origin, turned: 0 });
+        }
+        for (slot, to) in there.iter() {
+            // Over an edge that is not established the best path is the best of all.
+            let (value, from) = if here.vertex(best.1) == Some(to.vertex) { second } else { best };
+            let mut highest = (value - NEW_EDGE_COST, from);
+            let established = self.hmm.established(to.vertex);
+            for (from, state) in here.iter() {
+                if established.contains(state.vertex) && leaving[from] > highest.0 {
+                    highest = (leaving[from], from);
+                }
+            }
+            next[slot] = highest.0 + to.ln_emission;
+            self.next_origins[slot] = highest.1;
+        }
+    }
+
     fn add(&mut self, cell: &mut f32, value: f32, from: Slot, to: Slot) {
         if value > *cell {
             *cell = value;
