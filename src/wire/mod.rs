@@ -27,13 +27,15 @@
 //! ```
 
 mod decoder;
+mod decoder_counters;
 mod digest;
 mod frame;
 mod listener;
 mod messages;
 mod robot;
 
-pub use decoder::{Arrival, DecodeError, Decoder, DecoderCounters, Header, Progress};
+pub use decoder::{Arrival, DecodeError, Decoder, Header, Progress};
+pub use decoder_counters::DecoderCounters;
 pub use digest::{crc32, map_digest};
 pub use frame::{EncodeError, Encoder, FRAME_VERSION, MAX_FRAME_BYTES};
 pub use listener::MapReplica;

@@ -7,7 +7,7 @@ use std::sync::{Arc, mpsc};
 use std::thread::JoinHandle;
 
 use toposlam::reference::SNAPSHOT_BYTES;
-use toposlam::wire::{Refusal, Setting};
+use toposlam::wire::{Command, Outcome, Refusal, Setting};
 
 use super::*;
 use crate::broadcast::Broadcast;
