@@ -37,12 +37,14 @@ from typing import Annotated, Any, Callable, Iterable, Iterator, Optional, Union
 
 FRAME_VERSION = 2
 """The first byte of every frame of a robot; in a frame to a robot 128 is added."""
-PROTOCOL_VERSION = 6
+PROTOCOL_VERSION = 7
 """The version of the messages."""
-SCHEMA_HASH = 0x3BC2_F178_DFCA_A82F
+SCHEMA_HASH = 0xFF77_031D_62C1_94A5
 """The 64-bit FNV-1a hash of the schema in `docs/wire.md`."""
 CHUNK_BYTES = 64
 """The most bytes of a snapshot in one request or reply."""
+NAME_BYTES = 16
+"""The most bytes of the name of a vertex."""
 
 _TO_ROBOT = FRAME_VERSION | 1 << 7
 _HEADER_BYTES = 3
@@ -194,6 +196,28 @@ def _list(codec: _Codec, most: int, build: Callable[[Iterable[Any]], Any] = tupl
     return _Codec(read, write)
 
 
+def _text(bytes_max: int) -> _Codec:
+    """The number of bytes, then UTF-8 without zeros."""
+    encoded = _list(_byte(), bytes_max, bytes)
+
+    def read(payload: bytes, at: int) -> tuple[str, int]:
+        value, at = encoded.read(payload, at)
+        try:
+            text = value.decode()
+        except UnicodeDecodeError:
+            raise _UnknownPayload from None
+        if "\0" in text:
+            raise _UnknownPayload
+        return text, at
+
+    def write(value: str, out: bytearray) -> None:
+        if "\0" in value:
+            raise ValueError("a name has no zeros")
+        encoded.write(value.encode(), out)
+
+    return _Codec(read, write)
+
+
 def _record(of: type) -> _Codec:
     """The fields of a dataclass, in order; their types say how each is encoded."""
     hints = typing.get_type_hints(of, include_extras=True)
@@ -248,6 +272,7 @@ I32 = Annotated[int, _signed(32)]
 Flag = Annotated[bool, _flag()]
 OptionalU8 = Annotated[Optional[int], _optional(_byte())]
 Chunk = Annotated[bytes, _list(_byte(), CHUNK_BYTES, bytes)]
+NameText = Annotated[str, _text(NAME_BYTES)]
 
 
 # Messages of a robot.
@@ -324,6 +349,8 @@ class Refusal(enum.IntEnum):
     BAD_SNAPSHOT = 10
     BUSY = 11
     RECORDING = 12
+    BAD_NAME = 13
+    NAME_TAKEN = 14
 
     @classmethod
     def _missing_(cls, value: object) -> Refusal:
@@ -762,6 +789,21 @@ class Exploration:
     """Whether the drive reaches no frontier any more."""
 
 
+@dataclass(frozen=True)
+class Name:
+    """The name of a vertex."""
+
+    vertex: U8
+    name: NameText
+
+
+@dataclass(frozen=True)
+class Named:
+    """The vertices with a name, as a set of bits; the others have none."""
+
+    vertices: U64
+
+
 Message = Union[
     Hello,
     Place,
@@ -782,6 +824,8 @@ Message = Union[
     GoalStatus,
     Ways,
     Exploration,
+    Name,
+    Named,
 ]
 _MESSAGE = _choice(*typing.get_args(Message))
 
@@ -861,6 +905,13 @@ class Command:
     class GetSettings:
         """Requests the settings of the robot; the outcome is `Outcome.Settings`."""
 
+    @dataclass(frozen=True)
+    class Name:
+        """Names a vertex, or clears its name with an empty one."""
+
+        vertex: U8
+        name: NameText
+
 
 AnyCommand = Union[
     Command.Info,
@@ -876,6 +927,7 @@ AnyCommand = Union[
     Command.Explore,
     Command.Pause,
     Command.GetSettings,
+    Command.Name,
 ]
 
 
@@ -1138,6 +1190,8 @@ class MapReplica:
         self.place: Optional[Place] = None
         self.ring: Optional[Ring] = None
         self.velocity: Optional[Velocity] = None
+        self.names: dict[int, str] = {}
+        """The names of the vertices that have one."""
         self.faults: dict[FaultKind, int] = {kind: 0 for kind in FaultKind}
         self._labels: dict[int, tuple[int, int]] = {}
         """Radius and visits of the vertices with a known label."""
@@ -1173,6 +1227,10 @@ class MapReplica:
                 self.faults[FaultKind(message.kind)] = message.count
         elif isinstance(message, Remapped):
             self._remap(message)
+        elif isinstance(message, Name):
+            self._set_name(message.vertex, message.name)
+        elif isinstance(message, Named):
+            self.names = {vertex: name for vertex, name in self.names.items() if message.vertices >> vertex & 1}
         elif isinstance(message, GoalStatus):
             self.goal_status = message
         elif isinstance(message, Ways):
@@ -1220,6 +1278,12 @@ class MapReplica:
         ways = ((vertex, place, way) for vertex in range(self.vertices) for place, way in enumerate(self.ways(vertex)))
         return [WayId(vertex, place) for vertex, place, way in ways if way.leads_to is None]
 
+    def _set_name(self, vertex: int, name: str) -> None:
+        """Another vertex with this name loses it."""
+        self.names = {other: known for other, known in self.names.items() if other != vertex and known != name}
+        if name and vertex < _VERTICES_MAX:
+            self.names[vertex] = name
+
     def _set_label(self, label: Union[Vertex, Row]) -> None:
         if label.vertex < _VERTICES_MAX:
             self._labels[label.vertex] = (label.radius_mm, label.visits)
@@ -1240,6 +1304,7 @@ class MapReplica:
         """Removes the vertices from `vertices` on and their edges."""
         self.vertices = min(vertices, _VERTICES_MAX)
         kept = (1 << self.vertices) - 1
+        self.names = {vertex: name for vertex, name in self.names.items() if vertex < self.vertices}
         for vertex in range(_VERTICES_MAX):
             self._neighbours[vertex] &= kept if vertex < self.vertices else 0
         self._labels = {vertex: label for vertex, label in self._labels.items() if vertex < self.vertices}
@@ -1268,6 +1333,12 @@ class MapReplica:
                 self._labels.setdefault(now, labels[before])
             # And the first ways.
             self._ways.setdefault(now, tuple(way._remapped(remapped) for way in ways.get(before, ())))
+        # Of merged vertices the one that keeps its id keeps its name, otherwise the first one.
+        named, self.names = self.names, {}
+        for before in sorted(named, key=lambda vertex: (names[vertex] != vertex, vertex)):
+            now = names[before]
+            if now is not None and now < _VERTICES_MAX:
+                self.names.setdefault(now, named[before])
         if self.location:
             self.location = _with_vertex(self.location, remapped.now(self.location.vertex))
         if self.goal_status:
@@ -1296,19 +1367,21 @@ def _bits(row: int) -> Iterator[int]:
 def to_json(event: Event) -> dict[str, Any]:
     """An event as plain data, as the `toposlam` command prints it: `event` is the name of the message, `Damaged`, or
     `Unknown` for an intact frame of another version, with the fields of the message beside it. `lost` is present if frames
-    are missing before it."""
+    are missing before it, `late` if the frame was repeated or overtaken, and `restart` if the robot has restarted."""
     if isinstance(event, Damaged):
         is_unknown = event.error in (DecodeError.UNKNOWN_VERSION, DecodeError.UNKNOWN_MESSAGE)
         return {"event": "Unknown" if is_unknown else "Damaged", "error": str(event)}
     plain: dict[str, Any] = {**_plain(event.message), "event": type(event.message).__name__, "sequence": event.sequence}
     if event.arrival is Arrival.AFTER_GAP:
         plain["lost"] = event.lost
+    elif event.arrival in (Arrival.LATE, Arrival.RESTART):
+        plain[event.arrival.name.lower()] = True
     return plain
 
 
 def json_line(plain: Any) -> str:
     """Plain data as one line of JSON: keys sorted, no spaces."""
-    return json.dumps(plain, sort_keys=True, separators=(",", ":"))
+    return json.dumps(plain, sort_keys=True, separators=(",", ":"), ensure_ascii=False)
 
 
 def _plain(value: Any) -> Any:

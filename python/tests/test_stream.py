@@ -83,6 +83,7 @@ def replica_json(replica: MapReplica) -> dict[str, Any]:
         "frontiers": [plain(way) for way in replica.frontiers()],
         "is_converged": replica.is_converged(),
         "is_complete": replica.is_complete(),
+        "names": [[vertex, name] for vertex, name in sorted(replica.names.items())],
         "faults": list(replica.faults.values()),
         **{name: plain(getattr(replica, name)) for name in named},
     }
@@ -167,7 +168,7 @@ class Golden(unittest.TestCase):
         for version in (toposlam_stream.PROTOCOL_VERSION, toposlam_stream.FRAME_VERSION):
             self.assertIn(f"version is {version}", specification)
         self.assertIn(f"{toposlam_stream.SCHEMA_HASH:016X}", specification)
-        for kind, requests, count in (("example", False, 25), ("request", True, 21)):
+        for kind, requests, count in (("example", False, 27), ("request", True, 22)):
             blocks = re.findall(rf"```{kind}\n(.*?)```", specification, re.DOTALL)
             self.assertEqual(len(blocks), count)
             for block in blocks:

@@ -3,6 +3,8 @@
 //! This module depends on the stages whose state it saves; no stage depends on this module.
 
 mod mapper;
+#[cfg(feature = "wire")]
+mod names;
 mod ordered_filter;
 mod paper_filter;
 mod robust_filter;

@@ -41,8 +41,8 @@ where
             Command::GetMap => self.reporter.send_full(),
             Command::GetSnapshot { offset } => {
                 if offset == 0 {
-                    let Self { mapper, staging, .. } = self;
-                    staging.take(|buffer| snapshot(mapper, buffer).ok())?;
+                    let Self { mapper, reporter, staging, .. } = self;
+                    staging.take(|buffer| snapshot(mapper, reporter, buffer).ok())?;
                 }
                 return self.staging.outgoing_chunk(offset);
             }
@@ -61,6 +61,10 @@ where
             Command::GoTo { vertex } => self.go_to(vertex, board)?,
             Command::Explore => self.set_goal(Goal::Explore, board),
             Command::Pause { on } => self.paused = on,
+            Command::Name { vertex, name } => {
+                let vertex = self.known(vertex)?;
+                self.reporter.set_name(vertex.into(), name)?;
+            }
             Command::GetSettings => return Ok(Outcome::Settings { settings: self.settings().list() }),
         }
         Ok(Outcome::Done)
@@ -86,9 +90,9 @@ where
 
     /// Restores the snapshot received over the line. The robot may be at any vertex.
     fn restore_staged(&mut self, board: &mut impl Board) -> Result<(), Refusal> {
-        let Self { mapper, drive, staging, encoder, faults, .. } = self;
+        let Self { mapper, reporter, drive, staging, encoder, faults, .. } = self;
         let bytes = staging.commit()?;
-        if restore(mapper, drive, bytes, Resume::AtUnknownVertex).is_err() {
+        if restore(mapper, reporter, drive, bytes, Resume::AtUnknownVertex).is_err() {
             faults.record(FaultKind::SnapshotRejected);
             return Err(Refusal::BadSnapshot);
         }
@@ -136,9 +140,14 @@ where
         Ok(())
     }
 
-    fn go_to(&mut self, vertex: u8, board: &mut impl Board) -> Result<(), Refusal> {
+    /// A vertex of the map.
+    fn known(&self, vertex: u8) -> Result<VertexId, Refusal> {
         let known = VertexId::new(vertex).filter(|&vertex| self.mapper.map().contains(vertex));
-        let vertex = known.ok_or(Refusal::UnknownVertex)?;
+        known.ok_or(Refusal::UnknownVertex)
+    }
+
+    fn go_to(&mut self, vertex: u8, board: &mut impl Board) -> Result<(), Refusal> {
+        let vertex = self.known(vertex)?;
         if !self.drive.leads_to(self.mapper.filter(), vertex) {
             return Err(Refusal::NoRoute);
         }

@@ -63,11 +63,11 @@ use crate::fault::{FaultCounters, FaultKind};
 use crate::filter::{Filter, Update};
 use crate::mapper::Mapper;
 use crate::persist::Persist;
-use crate::persist::snapshot::{Resume, SnapshotError, SnapshotPolicy, Writer};
+use crate::persist::snapshot::{Resume, Snapshot, SnapshotError, SnapshotPolicy, Writer};
 use crate::place::Place;
 use crate::ring::RingFrame;
 use crate::wire::{
-    self, Echoes, Encoder, FilterSettings, Health, Inbox, MAX_FRAME_BYTES, Message, QueueFull, Reporter, Staging,
+    self, Echoes, Encoder, FilterSettings, Health, Inbox, MAX_FRAME_BYTES, Message, Names, QueueFull, Reporter, Staging,
 };
 
 /// How often the robot sends a `Hello`, in ring frames.
@@ -259,8 +259,8 @@ where
     /// Writes a snapshot to the board's store.
     #[inline(never)]
     fn save_snapshot(&mut self, board: &mut impl Board) {
-        let Self { mapper, staging, .. } = self;
-        let taken = staging.take(|buffer| snapshot(mapper, buffer).ok());
+        let Self { mapper, reporter, staging, .. } = self;
+        let taken = staging.take(|buffer| snapshot(mapper, reporter, buffer).ok());
         match taken.map(|()| board.save(staging.taken())) {
             Ok(Ok(())) => {
                 self.stored_bytes = u16::try_from(self.staging.taken().len()).unwrap_or(u16::MAX);
@@ -277,8 +277,8 @@ where
     /// [`SnapshotError`] if the snapshot is invalid; the state does not change then, and the fault is counted.
     #[inline(never)]
     pub fn restore(&mut self, bytes: &[u8], resume: Resume) -> Result<(), SnapshotError> {
-        let Self { mapper, drive, .. } = self;
-        let restored = restore(mapper, drive, bytes, resume);
+        let Self { mapper, reporter, drive, .. } = self;
+        let restored = restore(mapper, reporter, drive, bytes, resume);
         match restored {
             Ok(()) => self.localise_only = self.mapper.filter().is_localise_only(),
             Err(_) => self.faults.record(FaultKind::SnapshotRejected),
@@ -383,12 +383,16 @@ impl<BOARD: Board> Line<'_, BOARD> {
     }
 }
 
-/// Writes a whole snapshot.
+/// Writes a whole snapshot. The mapper uses the room that the names leave.
 fn snapshot<const SONARS: usize, const V: usize, F: Filter<V> + Persist>(
     mapper: &mut Mapper<SONARS, V, F>,
+    reporter: &Reporter<V>,
     buffer: &mut [u8],
 ) -> Result<usize, SnapshotError> {
     let mut writer = Writer::new(buffer)?;
+    if reporter.names().vertices() != 0 {
+        reporter.names().save(&mut writer)?;
+    }
     mapper.save(&mut writer)?;
     writer.finish()
 }
@@ -396,11 +400,16 @@ fn snapshot<const SONARS: usize, const V: usize, F: Filter<V> + Persist>(
 /// Restores a snapshot; the drive explores from there.
 fn restore<const SONARS: usize, const V: usize, F: Filter<V> + Persist>(
     mapper: &mut Mapper<SONARS, V, F>,
+    reporter: &mut Reporter<V>,
     drive: &mut Drive<V>,
     bytes: &[u8],
     resume: Resume,
 ) -> Result<(), SnapshotError> {
+    let snapshot = Snapshot::open(bytes)?;
+    Names::<V>::check(&snapshot)?;
     mapper.restore(bytes, resume)?;
+    let vertices = mapper.map().vertices().len();
+    reporter.change_names(|names| names.restore(&snapshot, vertices))?;
     drive.resume();
     if resume == Resume::AtUnknownVertex {
         drive.kidnapped();

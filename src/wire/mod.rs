@@ -32,6 +32,7 @@ mod digest;
 mod frame;
 mod listener;
 mod messages;
+mod names;
 mod robot;
 
 pub use decoder::{Arrival, DecodeError, Decoder, Header, Progress};
@@ -41,8 +42,9 @@ pub use frame::{EncodeError, Encoder, FRAME_VERSION, MAX_FRAME_BYTES};
 pub use listener::MapReplica;
 pub use messages::{
     Belief, CHUNK_BYTES, Capacities, Chunk, Clock, Command, Echoes, Evidence, Exploration, Factors, FilterSettings,
-    GoalState, GoalStatus, Health, Hello, HelloError, Info, List, Location, Message, Outcome, PROTOCOL_VERSION,
-    Payload, Refusal, Remapped, Reply, Request, ResetCause, Row, SCHEMA_HASH, SETTINGS_MAX, Setting, Settings, Start,
-    Velocity, Version, VertexProbability, VertexWays, Way, WayId, Worst,
+    GoalState, GoalStatus, Health, Hello, HelloError, Info, List, Location, Message, NAME_BYTES, Name, NameError,
+    Outcome, PROTOCOL_VERSION, Payload, Refusal, Remapped, Reply, Request, ResetCause, Row, SCHEMA_HASH, SETTINGS_MAX,
+    Setting, Settings, Start, Velocity, Version, VertexProbability, VertexWays, Way, WayId, Worst,
 };
+pub use names::Names;
 pub use robot::{Inbox, QueueFull, Reporter, Staging};

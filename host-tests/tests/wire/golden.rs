@@ -17,7 +17,7 @@ use toposlam_sim::world::{Plan, RobotModel};
 
 use super::samples::{extreme_requests, extremes, largest, largest_requests, requests, typical};
 use super::streams::{
-    Draw, damage, every_damage, foreign_payloads, impossible_ways, long_lists, lossy, renamed, restarted,
+    Draw, damage, every_damage, foreign_payloads, impossible_ways, long_lists, lossy, named, renamed, restarted,
     restarted_unheard, two_robots, version_5, wrapping,
 };
 use super::{decode, frame};
@@ -71,6 +71,9 @@ fn records(exploration: &[Vec<u8>]) -> Vec<Value> {
     records.push(stream("ways that no map has", &impossible_ways().concat()));
     let renamed = renamed();
     records.push(stream("a map that shrinks and is renamed", &renamed.concat()));
+    let named = named();
+    records.push(stream("vertices with names", &named.concat()));
+    records.push(stream("two vertices with names become one", &named[..7].concat()));
     records.push(stream("two vertices become one", &renamed[..15].concat()));
     for seed in 0..24 {
         let mut draw = Draw(seed);
@@ -156,6 +159,7 @@ fn replica_json(replica: &MapReplica<64>) -> Value {
         "worst": replica.worst(),
         "goal_status": replica.goal_status(),
         "exploration": replica.exploration(),
+        "names": replica.names().iter().map(|(vertex, name)| json!([vertex, name])).collect::<Vec<_>>(),
         "faults": FaultKind::ALL.map(|kind| replica.fault(kind)),
     })
 }

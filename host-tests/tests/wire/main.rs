@@ -7,6 +7,7 @@ mod damage;
 mod golden;
 mod inbox;
 mod listener;
+mod names;
 mod remapping;
 mod robot;
 mod samples;
@@ -19,8 +20,8 @@ mod streams;
 use samples::{largest, typical};
 use toposlam::VertexId;
 use toposlam::wire::{
-    Arrival, Decoder, Echoes, Encoder, Header, Health, Hello, MAX_FRAME_BYTES, Message, Payload, Progress, ResetCause,
-    Velocity,
+    Arrival, Decoder, Echoes, Encoder, Header, Health, Hello, MAX_FRAME_BYTES, Message, PROTOCOL_VERSION, Payload,
+    Progress, ResetCause, Velocity,
 };
 
 /// The vertex with an id.
@@ -193,7 +194,7 @@ fn a_hello_of_an_older_or_newer_version_is_read_as_far_as_it_is_known() {
             other => panic!("{other:?}"),
         })
         .collect();
-    assert_eq!(versions, [(5, 0, Arrival::First), (7, 0x5E55_1017, Arrival::Restart)]);
+    assert_eq!(versions, [(5, 0, Arrival::First), (PROTOCOL_VERSION + 1, 0x5E55_1017, Arrival::Restart)]);
     assert_eq!(decoded.errors, 0);
 }
 

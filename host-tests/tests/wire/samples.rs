@@ -4,7 +4,7 @@ use toposlam::Fingerprint;
 use toposlam::ring::Echo;
 use toposlam::wire::{
     Belief, CHUNK_BYTES, Capacities, Chunk, Command, Echoes, Evidence, Exploration, Factors, GoalState, GoalStatus,
-    Health, Hello, Info, List, Location, Message, Outcome, Refusal, Remapped, Reply, Request, ResetCause, Row,
+    Health, Hello, Info, List, Location, Message, Name, Outcome, Refusal, Remapped, Reply, Request, ResetCause, Row,
     SETTINGS_MAX, Setting, Velocity, Version, VertexProbability, VertexWays, Way, WayId, Worst,
 };
 
@@ -81,7 +81,13 @@ pub(crate) fn typical() -> Vec<Message> {
             ]),
         }),
         Message::Exploration(Exploration { frontiers: 5, complete: false }),
+        Message::Name { vertex: 3, name: name("kitchen") },
+        Message::Named { vertices: 0b1010_0010 },
     ]
+}
+
+fn name(text: &str) -> Name {
+    Name::new(text).expect("a valid name")
 }
 
 fn frontier(bearing_mrad: u16) -> Way {
@@ -134,6 +140,7 @@ pub(crate) fn requests() -> Vec<Request> {
         Command::Explore,
         Command::Pause { on: true },
         Command::GetSettings,
+        Command::Name { vertex: 3, name: name("kitchen") },
     ];
     let commands = commands.into_iter().chain(settings.map(Command::SetConfig)).chain(later);
     (300..).zip(commands).map(|(id, command)| Request { id, command }).collect()
@@ -160,6 +167,7 @@ pub(crate) fn largest_requests() -> Vec<Request> {
             other => other,
         }),
         Command::GoTo { .. } => Command::GoTo { vertex: u8::MAX },
+        Command::Name { .. } => Command::Name { vertex: u8::MAX, name: name("sixteen bytes ok") },
         other => other,
     };
     requests().into_iter().map(|Request { command, .. }| Request { id: u16::MAX, command: widen(command) }).collect()
@@ -245,6 +253,8 @@ pub(crate) fn largest() -> Vec<Message> {
         Message::GoalStatus(GoalStatus { vertex: BYTE, state: GoalState::Replaced }),
         Message::Ways(VertexWays { vertex: 63, ways: List::new([edge(6282, (62, 6), Some(SHORT)); 7]) }),
         Message::Exploration(Exploration { frontiers: BYTE, complete: true }),
+        Message::Name { vertex: BYTE, name: name("sixteen bytes ok") },
+        Message::Named { vertices: !0 },
     ]
 }
 
@@ -314,6 +324,8 @@ pub(crate) fn extremes() -> Vec<Message> {
         Message::Ways(VertexWays { vertex: 0, ways: List::new([]) }),
         Message::Ways(VertexWays { vertex: 0, ways: List::new([edge(0, (0, 1), Some(1)), edge(0, (0, 0), Some(1))]) }),
         Message::Exploration(Exploration { frontiers: 0, complete: false }),
+        Message::Name { vertex: 0, name: Name::NONE },
+        Message::Named { vertices: 0 },
     ];
     extremes.extend(ResetCause::ALL.iter().map(|&reset_cause| Message::Hello(Hello { reset_cause, ..hello })));
     extremes.extend(Refusal::ALL.iter().map(|&refusal| reply(Outcome::Refused(refusal))));
@@ -328,6 +340,7 @@ pub(crate) fn extreme_requests() -> Vec<Request> {
         Command::LocaliseOnly { on: false },
         Command::GoTo { vertex: 0 },
         Command::Pause { on: false },
+        Command::Name { vertex: 0, name: Name::NONE },
     ];
     commands.map(|command| Request { id: 0, command }).to_vec()
 }

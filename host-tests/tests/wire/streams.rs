@@ -4,8 +4,8 @@ use super::damage::with_crc;
 use super::samples::{extremes, largest, requests, typical};
 use super::{decode, frame};
 use toposlam::wire::{
-    Belief, Echoes, Encoder, FRAME_VERSION, GoalState, GoalStatus, Hello, List, Location, Message, Remapped,
-    ResetCause, VertexProbability, VertexWays, Way, WayId, Worst, crc32,
+    Belief, Echoes, Encoder, FRAME_VERSION, GoalState, GoalStatus, Hello, List, Location, Message, Name,
+    PROTOCOL_VERSION, Remapped, ResetCause, VertexProbability, VertexWays, Way, WayId, Worst, crc32,
 };
 
 /// Frames lost, repeated and overtaken.
@@ -44,6 +44,33 @@ pub(crate) fn restarted_unheard(frames: &[Vec<u8>]) -> Vec<u8> {
     [&frames.concat()[..], &ring(count, 5000), &ring(count + 100, 400), &again.collect::<Vec<u8>>()].concat()
 }
 
+/// Names that are given, moved, merged, removed with their vertices and cleared.
+pub(crate) fn named() -> Vec<Vec<u8>> {
+    let name = |vertex, text: &str| Message::Name { vertex, name: Name::new(text).expect("a valid name") };
+    let ids = |ids: &[u8]| Message::Remapped(Remapped { place_index: 2, vertices: List::new(ids.iter().copied()) });
+    let map = |vertices| Message::Map { vertices, edges: 0, digest: 0 };
+    let messages = [
+        map(8),
+        name(0, "hall"),
+        name(1, "Küche"),
+        name(2, "lift"),
+        name(6, "roof"),
+        // Another vertex takes a name.
+        name(3, "hall"),
+        // 1 and 2 are merged, 3 is removed.
+        ids(&[1, 2, 2, 255]),
+        name(0, "door"),
+        name(4, "stairs"),
+        Message::Named { vertices: 0b101_0101 },
+        ids(&[1, 0]),
+        map(6),
+        name(64, "beyond"),
+        Message::Name { vertex: 2, name: Name::NONE },
+    ];
+    let mut encoder = Encoder::new(0);
+    messages.iter().map(|message| frame(&mut encoder, message)).collect()
+}
+
 /// The frames of two robots in turns.
 pub(crate) fn two_robots(frames: &[Vec<u8>]) -> Vec<u8> {
     let Message::Hello(hello) = decode(&frames[0]).messages[0].1 else { panic!("the first message is a Hello") };
@@ -56,7 +83,7 @@ pub(crate) fn two_robots(frames: &[Vec<u8>]) -> Vec<u8> {
 pub(crate) fn version_5() -> Vec<u8> {
     let Message::Hello(hello) = typical()[0] else { panic!("the first sample is a Hello") };
     let old = Message::Hello(Hello { protocol_version: 5, session: 0, ..hello });
-    let later = Message::Hello(Hello { protocol_version: 7, ..hello });
+    let later = Message::Hello(Hello { protocol_version: PROTOCOL_VERSION + 1, ..hello });
     let mut old = unpacked(&frame(&mut Encoder::new(0), &old));
     assert_eq!(old.pop(), Some(0), "the session id is the last field");
     let mut later = unpacked(&frame(&mut Encoder::new(1), &later));

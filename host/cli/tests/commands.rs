@@ -38,7 +38,7 @@ fn plan_lists_the_places_of_a_map_draws_them_and_warns() {
     assert!(text.contains("place   0 at     3.30,3.10    radius  1000 mm, degree 1"), "{text}");
     assert!(text.contains("edge   0 -   1, 1.00 m") && text.contains("unreachable: 2 meet points"), "{text}");
     assert!(!text.contains("warning"), "{text}");
-    assert!(std::fs::read_to_string(&svg).unwrap().contains("2 places, 1 edges"));
+    assert!(std::fs::read_to_string(&svg).unwrap().contains("2 places, 1 edge"));
     let text = printed(&toposlam(&["plan", &map, "--start", "-0.85,3"]));
     assert!(text.contains("warning: the body does not fit at the start"), "{text}");
     // Nine by nine corridors 2 m wide.
@@ -128,7 +128,7 @@ fn replay_maps_a_recording() {
     let text = printed(&toposlam(&["replay", file.to_str().unwrap(), "--ring", ring.to_str().unwrap()]));
     assert!(text.contains("303 frames, 3 places"), "{text}");
     assert!(text.contains("the places were: 0 1 0"), "{text}");
-    assert!(text.contains("map: 2 vertices, 1 edges"), "{text}");
+    assert!(text.contains("map: 2 vertices, 1 edge"), "{text}");
     assert!(text.contains("edges: 0-1"), "{text}");
 }
 
@@ -201,22 +201,24 @@ fn command_sends_commands_and_prints_the_replies() {
     }
     assert_eq!(answering.join().unwrap(), [wire::Command::Info, wire::Command::GetSettings]);
 
-    for (arguments, command) in [
-        (&["reset"][..], wire::Command::Reset),
-        (&["set", "noise-mm", "40"], wire::Command::SetConfig(wire::Setting::NoiseMm(40))),
-        (&["localise-only", "on"], wire::Command::LocaliseOnly { on: true }),
-        (&["go-to", "3"], wire::Command::GoTo { vertex: 3 }),
-        (&["explore"], wire::Command::Explore),
-        (&["pause", "off"], wire::Command::Pause { on: false }),
+    let hall = wire::Name::new("hall").unwrap();
+    for (arguments, command, text) in [
+        (&["reset"][..], wire::Command::Reset, "the map is deleted, and the robot maps again"),
+        (&["set", "noise-mm", "40"], wire::Command::SetConfig(wire::Setting::NoiseMm(40)), "noise-mm 40 is set"),
+        (&["localise-only", "on"], wire::Command::LocaliseOnly { on: true }, "the robot keeps the map and localises"),
+        (&["go-to", "3"], wire::Command::GoTo { vertex: 3 }, "the robot is on its way to vertex 3"),
+        (&["name", "3", "hall"], wire::Command::Name { vertex: 3, name: hall }, "vertex 3 is named hall"),
+        (&["explore"], wire::Command::Explore, "the robot explores"),
+        (&["pause", "off"], wire::Command::Pause { on: false }, "the robot continues"),
     ] {
         let (line, answering) = robot(|_| Outcome::Done);
-        assert_eq!(printed(&toposlam(&[&["command", &line], arguments].concat())), "done\n");
-        assert_eq!(answering.join().unwrap(), [command]);
+        assert_eq!(printed(&toposlam(&[&["command", &line], arguments].concat())), format!("{text}\n"));
+        assert_eq!(answering.join().unwrap()[0], command);
     }
 
     let (line, answering) = robot(|_| Outcome::Done);
     let text = printed(&toposlam(&["command", &line, "map"]));
-    assert!(text.contains("map: 1 vertices, 1 edges") && text.contains("radius 1172 mm, 12 visits"), "{text}");
+    assert!(text.contains("map: 1 vertex, 1 edge") && text.contains("radius 1172 mm, 12 visits"), "{text}");
     assert_eq!(answering.join().unwrap(), [wire::Command::GetMap]);
 }
 
@@ -255,7 +257,7 @@ fn command_reports_why_it_failed() {
     let text = complaint(&toposlam(&["command", &line, "go-to", "99"]));
     assert!(text.contains("the map has no such vertex"), "{text}");
     let text = complaint(&toposlam(&["command", "no-such-port", "info"]));
-    assert!(text.contains("opening the serial port no-such-port"), "{text}");
+    assert!(text.contains("no-such-port: no such file or serial port"), "{text}");
     let listener = TcpListener::bind("127.0.0.1:0").unwrap();
     let line = format!("tcp:{}", listener.local_addr().unwrap());
     let silent = ["command", "--timeout-ms", "10", "--attempts", "2", &line, "info"];
@@ -279,7 +281,7 @@ fn export_writes_the_map_of_a_stream_and_reports_its_gaps() {
     assert!(String::from_utf8_lossy(&output.stderr).contains("the map is incomplete"));
 
     std::fs::write(&file, b"no robot").unwrap();
-    assert!(complaint(&toposlam(&["export", name, "--format", "svg"])).contains("no map received"));
+    assert!(complaint(&toposlam(&["export", name, "--format", "svg"])).contains("no message of a robot"));
     assert!(complaint(&toposlam(&["export", name, "--format", "png"])).contains("graphml, dot, geojson, json, svg"));
     assert!(complaint(&toposlam(&["export", name, "--format", "geojson", "--edge-m", "0"])).contains("0.1 to 1000"));
 }

@@ -91,6 +91,8 @@ fn go_to_waits_for_the_arrival_and_its_exit_status_says_how_it_ended() {
     printed(&robot.command(&["pause", "on"]));
     let output = robot.command(&["go-to", "1", "--wait", "--wait-s", "0.5"]);
     assert_eq!(output.status.code(), Some(4), "{}", complaint(&output));
+    let text = complaint(&output);
+    assert!(text.contains("is paused, and drives after") && text.contains("after 0.5 s, and is paused"), "{text}");
     let waiting = Command::new(TOPOSLAM)
         .args(["command", &robot.line, "go-to", "1", "--wait", "--wait-s", "60"])
         .stdout(Stdio::null())
@@ -164,4 +166,75 @@ fn file_names_need_not_be_utf_8() {
     let output = run(&["export".as_ref(), stream.as_ref(), "--format".as_ref(), "json".as_ref()]);
     assert_eq!(printed(&output), text);
     assert!(String::from_utf8_lossy(&output.stderr).contains("1 restart of the robot;"));
+}
+
+#[test]
+fn a_place_has_a_name_until_it_is_cleared_and_go_to_takes_it() {
+    let directory = tempfile::tempdir().unwrap();
+    let (snapshot, json) = (path(&directory, "robot.snapshot"), path(&directory, "map.json"));
+    let robot = robot("100");
+    robot.wait_for_vertices(4);
+    printed(&robot.command(&["localise-only", "on"]));
+    assert!(printed(&robot.command(&["name"])).is_empty());
+    printed(&robot.command(&["name", "1", "Küche"]));
+    printed(&robot.command(&["name", "2", "hall"]));
+    for (arguments, why) in [
+        (&["name", "0", "hall"][..], "another vertex has this name"),
+        (&["name", "60", "roof"], "the map has no such vertex"),
+        (&["name", "0", "a name of 17 byte"], "a name has at most 16 bytes"),
+        (&["name", "0", "3"], "a name is not a number"),
+        (&["name", "0"], "--clear clears the name"),
+        (&["go-to", "cellar"], "no vertex has the name `cellar`"),
+    ] {
+        let text = complaint(&robot.command(arguments));
+        assert!(text.contains(why), "{arguments:?}: {text}");
+    }
+    assert_eq!(printed(&robot.command(&["name"])), "1 Küche\n2 hall\n");
+    assert!(printed(&robot.command(&["map"])).contains("visits, Küche"));
+    assert!(printed(&robot.command(&["go-to", "hall", "--wait"])).contains("at vertex 2 hall"));
+    // A snapshot and every export have the names.
+    printed(&robot.command(&["snapshot", snapshot]));
+    for source in [&robot.line, snapshot] {
+        printed(&toposlam(&["export", source, "--format", "json", "--output", json, "--force"]));
+        for (format, expected) in [
+            ("graphml", "<data key=\"name\">Küche</data>"),
+            ("dot", "name = \"Küche\""),
+            ("geojson", "\"name\": \"Küche\""),
+            ("json", "\"name\": \"Küche\""),
+            ("svg", "Küche"),
+        ] {
+            let text = printed(&toposlam(&["export", json, "--format", format]));
+            assert!(text.contains(expected), "{format}: {text}");
+        }
+    }
+    printed(&robot.command(&["name", "hall", "lobby"]));
+    printed(&robot.command(&["name", "Küche", "--clear"]));
+    assert_eq!(printed(&robot.command(&["name"])), "2 lobby\n");
+    printed(&robot.command(&["restore", snapshot]));
+    assert_eq!(printed(&robot.command(&["name"])), "1 Küche\n2 hall\n");
+    printed(&robot.command(&["reset"]));
+    assert!(printed(&robot.command(&["name"])).is_empty());
+}
+
+/// GraphML and GeoJSON of `export` are a known map for a robot, with its names.
+#[test]
+fn a_robot_localises_on_an_exported_map_of_every_format_that_is_read() {
+    let directory = tempfile::tempdir().unwrap();
+    let robot = robot("100");
+    robot.wait_for_vertices(3);
+    printed(&robot.command(&["localise-only", "on"]));
+    printed(&robot.command(&["name", "1", "hall"]));
+    let map = path(&directory, "map.json");
+    printed(&toposlam(&["export", &robot.line, "--format", "json", "--output", map]));
+    let known = path(&directory, "known.snapshot");
+    let expected = printed(&toposlam(&["export", map, "--format", "dot"]));
+    for format in ["json", "graphml", "geojson"] {
+        let file = path(&directory, format);
+        printed(&toposlam(&["export", map, "--format", format, "--output", file]));
+        assert_eq!(printed(&toposlam(&["export", file, "--format", "dot"])), expected, "{format}");
+        printed(&toposlam(&["export", file, "--format", "snapshot", "--output", known, "--force"]));
+        let text = printed(&robot.command(&["restore", known]));
+        assert!(!text.contains("localise-only off"), "{format}: {text}");
+        assert_eq!(printed(&robot.command(&["name"])), "1 hall\n", "{format}");
+    }
 }

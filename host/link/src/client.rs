@@ -12,6 +12,7 @@ use toposlam::wire::{
 };
 
 use crate::listener::{Event, Listener};
+use crate::plural::count;
 use crate::setting;
 
 const BUFFER_BYTES: usize = 4096;
@@ -315,7 +316,11 @@ impl fmt::Display for ClientError {
         match self {
             Self::Line(_) => f.write_str("the line to the robot failed"),
             Self::NoReply { attempts } => {
-                write!(f, "no reply to {attempts} requests: the robot is not connected, or does not know the command")
+                write!(
+                    f,
+                    "no reply to {}: the robot is not connected, or does not know the command",
+                    count(*attempts, "request", "requests")
+                )
             }
             Self::Refused(refusal) => write!(f, "the robot refused: {refusal}"),
             Self::OutOfPlace(outcome) => write!(f, "unexpected reply: {outcome:?}"),

@@ -8,15 +8,16 @@
 //! assert_eq!(event_text::message(&seen), "place 3: radius 1172 mm, 3 ways, in frame 210");
 //! ```
 
-use toposlam::FaultKind;
 use toposlam::drive::DriveState;
 use toposlam::ring::Echo;
 use toposlam::wire::{
     Arrival, Belief, Command, DecodeError, Evidence, Exploration, Factors, GoalStatus, Health, Hello, Info, Message,
     Outcome, Refusal, Remapped, Row, Setting, Velocity, VertexWays, Way, Worst,
 };
+use toposlam::{FaultKind, VertexSet};
 
 use crate::listener::Event;
+use crate::plural::count;
 use crate::setting;
 
 /// Wire units of a logarithm per nat.
@@ -28,7 +29,9 @@ pub fn event(event: Event<'_>) -> String {
         Event::Damaged(error) if is_unknown(error) => format!("unknown: {error}"),
         Event::Damaged(error) => format!("damaged: {error}"),
         Event::Message(header, received) => match header.arrival {
-            Arrival::AfterGap { lost } => format!("{} (after {lost} lost frames)", message(received)),
+            Arrival::AfterGap { lost } => {
+                format!("{} (after {})", message(received), count(lost, "lost frame", "lost frames"))
+            }
             Arrival::Late => format!("{} (late, not counted)", message(received)),
             Arrival::Restart => format!("{} (the robot has restarted)", message(received)),
             Arrival::First | Arrival::InOrder => message(received),
@@ -46,21 +49,27 @@ pub fn message(message: &Message) -> String {
     match message {
         Message::Hello(hello) => introduction(hello),
         Message::Place { place_index, frame_index, radius_mm, degree } => {
-            let ways = degree.map_or(String::new(), |degree| format!(", {degree} ways"));
+            let ways = degree.map_or(String::new(), |degree| format!(", {}", count(degree, "way", "ways")));
             format!("place {place_index}: radius {radius_mm} mm{ways}, in frame {frame_index}")
         }
         Message::Map { vertices, edges, digest } => {
-            format!("map: {vertices} vertices, {edges} edges, digest {digest:08x}")
+            format!(
+                "map: {}, {}, digest {digest:08x}",
+                count(*vertices, "vertex", "vertices"),
+                count(*edges, "edge", "edges")
+            )
         }
         Message::Vertex { vertex, radius_mm, visits } => {
-            format!("vertex {vertex}: radius {radius_mm} mm, {visits} visits")
+            format!("vertex {vertex}: radius {radius_mm} mm, {}", count(*visits, "visit", "visits"))
         }
         Message::Edge { a, b, present: true } => format!("edge {a}-{b}"),
         Message::Edge { a, b, present: false } => format!("no edge {a}-{b} any more"),
         Message::Location(location) => format!("at vertex {} with place {}", location.vertex, location.place_index),
         Message::Evidence(evidence) => reasons(evidence),
         Message::Row(row) => whole_vertex(row),
-        Message::Fault { kind, count } => format!("fault {}: {count} times", fault_name(*kind)),
+        Message::Fault { kind, count } => {
+            format!("fault {}: {}", fault_name(*kind), self::count(*count, "time", "times"))
+        }
         Message::Health(health) => condition(health),
         Message::Ring { frame_index, echoes } => {
             let ranges: Vec<String> = echoes.iter().map(range).collect();
@@ -74,9 +83,19 @@ pub fn message(message: &Message) -> String {
         Message::GoalStatus(GoalStatus { vertex, state }) => format!("goal vertex {vertex}: {state}"),
         Message::Ways(ways) => self::ways(ways),
         Message::Exploration(Exploration { frontiers, complete: true }) => {
-            format!("exploration complete, {frontiers} frontiers")
+            format!("exploration complete, {}", count(*frontiers, "frontier", "frontiers"))
         }
-        Message::Exploration(Exploration { frontiers, complete: false }) => format!("{frontiers} frontiers"),
+        Message::Exploration(Exploration { frontiers, complete: false }) => count(*frontiers, "frontier", "frontiers"),
+        Message::Name { vertex, name } => format!("vertex {vertex} is named {name}"),
+        Message::Named { vertices } => {
+            let named: Vec<String> =
+                VertexSet::from_bits(*vertices).iter().map(|vertex| u8::from(vertex).to_string()).collect();
+            if named.is_empty() {
+                "no vertex has a name".to_owned()
+            } else {
+                format!("vertices with a name: {}", named.join(" "))
+            }
+        }
         other => format!("{other:?}"),
     }
 }
@@ -115,7 +134,7 @@ pub fn info(info: &Info) -> Vec<String> {
     let mut lines = vec![
         format!("toposlam {}.{}.{}", version.major, version.minor, version.patch),
         if info.boot == 0 {
-            info.reset_cause.to_string()
+            format!("started: {}", info.reset_cause)
         } else {
             format!("start {}: {}", info.boot, info.reset_cause)
         },
@@ -125,7 +144,7 @@ pub fn info(info: &Info) -> Vec<String> {
     lines.extend(info.goal.map(|vertex| format!("driving to vertex {vertex}")));
     lines.push(match info.stored_bytes {
         0 => "no snapshot stored".to_owned(),
-        bytes => format!("snapshot of {bytes} bytes stored {} places ago", info.stored_places_ago),
+        bytes => format!("snapshot of {bytes} bytes stored {} ago", count(info.stored_places_ago, "place", "places")),
     });
     lines
 }
@@ -175,12 +194,8 @@ pub fn start(hello: &Hello) -> String {
 
 /// How often the robot restarted within a stream, and the map that is left of it; `None` if it did not.
 pub fn restarts(restarts: u32) -> Option<String> {
-    let times = match restarts {
-        0 => return None,
-        1 => "1 restart".to_owned(),
-        _ => format!("{restarts} restarts"),
-    };
-    Some(format!("{times} of the robot; the map is that of the last start"))
+    let times = count(restarts, "restart", "restarts");
+    (restarts > 0).then(|| format!("{times} of the robot; the map is that of the last start"))
 }
 
 fn introduction(hello: &Hello) -> String {
@@ -220,7 +235,8 @@ pub fn factors(factors: &Factors) -> String {
 fn ways(ways: &VertexWays) -> String {
     let way = |way: &Way| {
         let bearing = (f64::from(way.bearing_mrad) / 1000.0).to_degrees();
-        let time = way.travel_frames.map_or_else(String::new, |frames| format!(" in {frames} frames"));
+        let time =
+            way.travel_frames.map_or_else(String::new, |frames| format!(" in {}", count(frames, "frame", "frames")));
         match way.leads_to {
             Some(end) => format!("{bearing:.0}° to {}.{}{time}", end.vertex, end.way),
             None => format!("{bearing:.0}° frontier"),
@@ -232,12 +248,12 @@ fn ways(ways: &VertexWays) -> String {
 
 fn reasons(evidence: &Evidence) -> String {
     format!(
-        "evidence of place {}: consistency {}, {}, lead {:.2} nats, {} hypotheses",
+        "evidence of place {}: consistency {}, {}, lead {:.2} nats, {}",
         evidence.place_index,
         distance(evidence.consistency_mm),
         factors(&evidence.factors),
         nats(evidence.lead_q16),
-        evidence.distinct_hypotheses
+        count(evidence.distinct_hypotheses, "hypothesis", "hypotheses")
     )
 }
 
@@ -245,19 +261,19 @@ fn whole_vertex(row: &Row) -> String {
     let neighbours: Vec<String> =
         (0..64).filter(|vertex| row.neighbours >> vertex & 1 == 1).map(|vertex: u8| vertex.to_string()).collect();
     format!(
-        "vertex {}: radius {} mm, {} visits, neighbours {}",
+        "vertex {}: radius {} mm, {}, neighbours {}",
         row.vertex,
         row.radius_mm,
-        row.visits,
+        count(row.visits, "visit", "visits"),
         neighbours.join(" ")
     )
 }
 
 fn condition(health: &Health) -> String {
     format!(
-        "health: up for {:.1} s, {} turns, stack {} bytes, longest turn {} us",
+        "health: up for {:.1} s, {}, stack {} bytes, longest turn {} us",
         seconds(health.uptime_ms),
-        health.loop_count,
+        count(health.loop_count, "turn", "turns"),
         health.stack_high_water_bytes,
         health.worst_turn_us
     )
@@ -298,10 +314,10 @@ fn new_ids(remapped: &Remapped) -> String {
 fn worst_explained(worst: &Worst) -> String {
     let walk: Vec<String> = worst.vertices.as_slice().iter().map(u8::to_string).collect();
     format!(
-        "worst explained: {} from walk {}, {} places ago",
+        "worst explained: {} from walk {}, {} ago",
         distance(worst.distance_mm),
         walk.join("-"),
-        worst.newest_age
+        count(worst.newest_age, "place", "places")
     )
 }
 

@@ -17,7 +17,8 @@ use crate::event_text;
 use crate::listener::Event;
 
 /// One event. `event` is the name of the message, `Damaged`, or `Unknown` for an intact frame of another version; the message's
-/// fields follow under their names. `lost` is present if frames are missing before the event.
+/// fields follow under their names. `lost` is present if frames are missing before the event, `late` if the frame was repeated or
+/// overtaken, and `restart` if the robot has restarted.
 pub fn event(event: Event<'_>) -> Value {
     let (header, message) = match event {
         Event::Damaged(error) => {
@@ -38,8 +39,11 @@ pub fn event(event: Event<'_>) -> Value {
         },
     };
     object.insert("sequence".to_owned(), header.sequence.into());
-    if let Arrival::AfterGap { lost } = header.arrival {
-        object.insert("lost".to_owned(), lost.into());
+    match header.arrival {
+        Arrival::AfterGap { lost } => drop(object.insert("lost".to_owned(), lost.into())),
+        Arrival::Late => drop(object.insert("late".to_owned(), true.into())),
+        Arrival::Restart => drop(object.insert("restart".to_owned(), true.into())),
+        Arrival::First | Arrival::InOrder => {}
     }
     Value::Object(object)
 }
@@ -78,6 +82,18 @@ mod tests {
             json!({"event": "Ring", "frame_index": 1, "ranges_mm": ["dead", "silence", 5], "sequence": 9, "lost": 3})
         );
         assert_eq!(event(Event::Damaged(DecodeError::Cut))["event"], "Damaged");
+    }
+
+    #[test]
+    fn restarts_and_late_frames_are_marked() {
+        let edge = Message::Edge { a: 0, b: 1, present: true };
+        let marks = |arrival| {
+            let event = event(Event::Message(Header { sequence: 3, arrival }, &edge));
+            [event["restart"].clone(), event["late"].clone()]
+        };
+        assert_eq!(marks(Arrival::Restart), [json!(true), Value::Null]);
+        assert_eq!(marks(Arrival::Late), [Value::Null, json!(true)]);
+        assert_eq!(marks(Arrival::InOrder), [Value::Null, Value::Null]);
     }
 
     #[test]

@@ -5,7 +5,8 @@
 //! [`layout`] computes positions for drawing it. [`export`] writes the map in other formats, [`mod@import`] reads it from
 //! files, [`mod@merge`] merges two maps, and `recording` (feature `recording`) records the line. [`link`] keeps a line open
 //! in its own thread, and [`watch`] keeps the newest state of a link. [`event_text`] and [`mod@json`] format an event as
-//! text and as JSON; [`mod@setting`] names the robot's settings.
+//! text and as JSON; [`mod@setting`] names the robot's settings, and [`plural`] counts
+//! things.
 
 pub mod broadcast;
 pub mod client;
@@ -19,6 +20,7 @@ pub mod link;
 pub mod listener;
 pub mod merge;
 pub mod playback;
+pub mod plural;
 #[cfg(feature = "recording")]
 pub mod recording;
 pub mod setting;

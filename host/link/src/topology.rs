@@ -17,8 +17,10 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
+use std::collections::BTreeMap;
+
 use petgraph::graph::UnGraph;
-use toposlam::wire::{MapReplica, VertexWays, Way, WayId, crc32};
+use toposlam::wire::{MapReplica, Names, VertexWays, Way, WayId, crc32};
 use toposlam::{Filter, Map, VertexId};
 
 /// The vertices of a map and the edges between them; with their ways, if the robot knows them.
@@ -30,6 +32,8 @@ pub struct TopologicalMap {
     pub edges: Vec<(u8, u8)>,
     /// The ways of each vertex in counter-clockwise order; empty if the robot knows edges only.
     pub ways: Vec<Vec<Way>>,
+    /// The names that an operator has given to vertices.
+    pub names: BTreeMap<u8, String>,
 }
 
 /// An edge between two ways.
@@ -51,6 +55,17 @@ pub struct Vertex {
 }
 
 impl TopologicalMap {
+    /// The number of a vertex, with its name if it has one.
+    pub fn vertex_text(&self, vertex: u8) -> String {
+        self.names.get(&vertex).map_or_else(|| vertex.to_string(), |name| format!("{vertex} {name}"))
+    }
+
+    /// The vertex with a number as text, which the map need not have yet, or with a name.
+    pub fn find_vertex(&self, text: &str) -> Option<u8> {
+        let named = || self.names.iter().find(|(_, name)| *name == text).map(|(&vertex, _)| vertex);
+        text.parse().ok().or_else(named)
+    }
+
     /// Converts to a graph of `petgraph`, in which node `n` is vertex `n`. An edge is that of [`TopologicalMap::all_edges`].
     pub fn to_petgraph(&self) -> UnGraph<Vertex, Option<WayEdge>> {
         let mut graph = UnGraph::with_capacity(self.vertices.len(), self.edges.len());
@@ -158,6 +173,11 @@ impl TopologicalMap {
     }
 }
 
+/// The names of vertices.
+pub(crate) fn names<const V: usize>(names: &Names<V>) -> BTreeMap<u8, String> {
+    names.iter().map(|(vertex, name)| (vertex, name.to_string())).collect()
+}
+
 /// The map as received so far.
 impl<const V: usize> From<&MapReplica<V>> for TopologicalMap {
     fn from(replica: &MapReplica<V>) -> Self {
@@ -166,7 +186,8 @@ impl<const V: usize> From<&MapReplica<V>> for TopologicalMap {
         };
         let ways = (0..replica.vertices()).map(|vertex| replica.ways(vertex).to_vec()).collect();
         let vertices = (0..replica.vertices()).map(label).collect();
-        Self { vertices, edges: replica.edges().collect(), ways }.without_empty_ways()
+        let names = names(replica.names());
+        Self { vertices, edges: replica.edges().collect(), ways, names }.without_empty_ways()
     }
 }
 
@@ -179,7 +200,7 @@ impl<const V: usize> From<&Map<V>> for TopologicalMap {
         };
         let edges = map.edges().map(|(a, b)| (a.into(), b.into()));
         let vertices = map.vertices().zip(map.labels()).map(label).collect();
-        Self { vertices, edges: edges.collect(), ways: Vec::new() }
+        Self { vertices, edges: edges.collect(), ..Self::default() }
     }
 }
 

@@ -66,6 +66,7 @@ fn main() -> ! {
     robot::drive();
     mapper::mapper();
     wire::wire();
+    wire::names();
     wire::commands();
     robot::robot();
     #[cfg(teeth)]

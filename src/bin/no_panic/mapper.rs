@@ -39,8 +39,8 @@ pub(crate) fn mapper() {
 }
 
 fn snapshot(mapper: &mut SmallMapper) {
-    static BYTES: ConstStaticCell<[u8; 512]> = ConstStaticCell::new([0; 512]);
-    let Some(buffer) = BYTES.try_take().and_then(|bytes| bytes.get_mut(..black_box(500))) else { return };
+    static BYTES: ConstStaticCell<[u8; 128]> = ConstStaticCell::new([0; 128]);
+    let Some(buffer) = BYTES.try_take().and_then(|bytes| bytes.get_mut(..black_box(100))) else { return };
     if let Err(error) = mapper.snapshot(buffer) {
         show::<SnapshotError>(error);
     }

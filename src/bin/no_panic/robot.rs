@@ -116,7 +116,7 @@ pub(crate) fn drive() {
 
 pub(crate) fn robot() {
     static ROBOT: ConstStaticCell<ReferenceRobot<'static>> = ConstStaticCell::new(ReferenceRobot::new());
-    static BUFFER: ConstStaticCell<[u8; 512]> = ConstStaticCell::new([0; 512]);
+    static BUFFER: ConstStaticCell<[u8; 128]> = ConstStaticCell::new([0; 128]);
     let (Some(robot), Some(buffer)) = (ROBOT.try_take(), BUFFER.try_take()) else { return };
     if let Err(error) = robot.start(&reference::ROBOT.opaque(), buffer) {
         show::<toposlam::ConfigError>(error);

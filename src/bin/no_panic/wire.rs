@@ -5,14 +5,16 @@ use core::hint::black_box;
 use static_cell::ConstStaticCell;
 use toposlam::{
     FaultKind, RobustConfig,
+    persist::snapshot::{Snapshot, Writer},
     place::PlaceConfig,
     wire::{
-        Decoder, EncodeError, Encoder, GoalState, Hello, HelloError, Inbox, MAX_FRAME_BYTES, MapReplica, Message,
-        Outcome, Payload, Progress, Refusal, Reply, Request, ResetCause, Setting, Settings, Staging, Version, crc32,
+        Decoder, EncodeError, Encoder, GoalState, Hello, HelloError, Inbox, MAX_FRAME_BYTES, MapReplica, Message, Name,
+        NameError, Names, Outcome, Payload, Progress, Refusal, Reply, Request, ResetCause, Setting, Settings, Staging,
+        Version, crc32,
     },
 };
 
-use super::any::{Opaque, any_frame, show};
+use super::any::{Opaque, any_frame, discard, show};
 
 pub(crate) fn wire() {
     static BYTES: ConstStaticCell<[u8; MAX_FRAME_BYTES]> = ConstStaticCell::new([0; MAX_FRAME_BYTES]);
@@ -59,6 +61,29 @@ pub(crate) fn wire() {
     for echo in echoes.iter() {
         black_box(echo);
     }
+}
+
+pub(crate) fn names() {
+    let mut names = Names::<16>::new();
+    let text = black_box("hall");
+    match Name::new(text) {
+        Ok(name) => discard(names.set(black_box(3), name)),
+        Err(error) => show::<NameError>(error),
+    }
+    show::<Name>(names.get(black_box(3)));
+    names.remap(|vertex| black_box(Some(vertex)));
+    names.truncate(black_box(7));
+    black_box((names.find(text), names.vertices(), names.iter().count()));
+    let mut bytes = [0; 100];
+    if let Ok(mut writer) = Writer::new(&mut bytes) {
+        discard(names.save(&mut writer));
+        discard(writer.finish());
+    }
+    if let Ok(snapshot) = Snapshot::open(black_box(&bytes)) {
+        discard(Names::<16>::check(&snapshot));
+        discard(names.restore(&snapshot, black_box(7)));
+    }
+    names.clear();
 }
 
 pub(crate) fn commands() {

@@ -40,6 +40,9 @@ pub const SNAPSHOT_VERSION: u16 = 3;
 /// The tag of the filter's section.
 pub const FILTER_SECTION: u8 = 1;
 
+/// The tag of the section with the names of vertices.
+pub const NAMES_SECTION: u8 = 2;
+
 /// The first byte of the filter's section: the kind of filter.
 pub(crate) const ROBUST: u8 = 1;
 /// As [`ROBUST`], of the paper's filter.

@@ -8,14 +8,14 @@ use crate::wire::decoder::{Arrival, Header};
 use crate::wire::digest::digest;
 use crate::wire::messages::bit;
 use crate::wire::{
-    Belief, Evidence, Exploration, GoalStatus, Health, Hello, List, Location, Message, Remapped, Row, VertexWays, Way,
-    WayId, Worst,
+    Belief, Evidence, Exploration, GoalStatus, Health, Hello, List, Location, Message, Names, Remapped, Row,
+    VertexWays, Way, WayId, Worst,
 };
 
 /// A replica of the robot's map and of the newest of its other messages.
 ///
 /// Messages may be lost, repeated or late: late ones are ignored, and the robot repeats its map in turn. `V` must be at
-/// least that of the robot; 64 always suffices. Memory: 88 bytes per vertex and about 280 bytes.
+/// least that of the robot; 64 always suffices. Memory: 104 bytes per vertex and about 280 bytes.
 #[derive(Clone, Debug)]
 pub struct MapReplica<const V: usize> {
     vertices: u8,
@@ -34,6 +34,7 @@ pub struct MapReplica<const V: usize> {
     worst: Option<Worst>,
     goal_status: Option<GoalStatus>,
     exploration: Option<Exploration>,
+    names: Names<V>,
     faults: [u32; FaultKind::ALL.len()],
 }
 
@@ -58,6 +59,7 @@ impl<const V: usize> MapReplica<V> {
             worst: None,
             goal_status: None,
             exploration: None,
+            names: Names::new(),
             faults: [0; FaultKind::ALL.len()],
         }
     }
@@ -98,6 +100,8 @@ impl<const V: usize> MapReplica<V> {
             Message::GoalStatus(goal_status) => self.goal_status = Some(goal_status),
             Message::Ways(ways) => self.set_ways(ways),
             Message::Exploration(exploration) => self.exploration = Some(exploration),
+            Message::Name { vertex, name } => self.names.put(vertex, name),
+            Message::Named { vertices } => self.names.keep(vertices),
             Message::Place { .. } | Message::Ring { .. } | Message::Velocity(_) | Message::Reply(_) => {}
         }
     }
@@ -198,6 +202,11 @@ impl<const V: usize> MapReplica<V> {
         self.exploration
     }
 
+    /// The names of the vertices.
+    pub const fn names(&self) -> &Names<V> {
+        &self.names
+    }
+
     /// The last count of a kind of fault.
     pub fn fault(&self, kind: FaultKind) -> u32 {
         self.faults.get(kind as usize).copied().unwrap_or(0)
@@ -207,10 +216,11 @@ impl<const V: usize> MapReplica<V> {
     fn remap(&mut self, remapped: &Remapped) {
         self.digest = None;
         self.vertices = remapped.count(self.vertices).min(V as u8);
-        self.labelled = remapped.apply(&mut self.labels, &mut self.neighbours, self.labelled);
+        self.labelled = remapped.apply(&mut self.labels, (0, 0), &mut self.neighbours, self.labelled);
         remapped.apply_to_ways(&mut self.ways, NO_WAYS, |ways| {
             ways.as_mut_slice().iter_mut().for_each(|way| *way = way.remapped(remapped));
         });
+        self.names.remap(|vertex| remapped.now(vertex));
         self.location = self.location.and_then(|location| location.remapped(remapped));
         if let Some(belief) = &mut self.belief {
             belief.remap(remapped);
@@ -262,6 +272,7 @@ impl<const V: usize> MapReplica<V> {
                 ways.as_mut_slice().iter_mut().filter(|way| beyond(way)).for_each(|way| *way = way.frontier());
             }
         }
+        self.names.keep(kept);
         self.labelled &= kept;
         self.vertices = vertices.min(V as u8);
     }

@@ -101,16 +101,17 @@ impl Remapped {
         }
     }
 
-    /// Applies the new ids to the labels and rows of a map. `labelled` is the set of vertices with a known label; the result is
+    /// Applies the new ids to the labels and rows of a map. `unlabelled` is the label of a vertex without one. `labelled` is the set of vertices with a known label; the result is
     /// the same set after the update. Merged vertices keep the first label and all edges; ids from `V` on are dropped.
-    pub(in crate::wire) fn apply<const V: usize>(
+    pub(in crate::wire) fn apply<T: Copy, const V: usize>(
         &self,
-        labels: &mut [(u16, u32); V],
+        labels: &mut [T; V],
+        unlabelled: T,
         neighbours: &mut [u64; V],
         labelled: u64,
     ) -> u64 {
         let (labels_before, neighbours_before) = (*labels, *neighbours);
-        *labels = [(0, 0); V];
+        *labels = [unlabelled; V];
         *neighbours = [0; V];
         let mut labelled_now = 0;
         for ((before, label), row) in (0..).zip(labels_before).zip(neighbours_before) {

@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::{List, Setting};
+use super::{List, Name, Setting};
 
 /// The most bytes of a snapshot in one request or reply.
 pub const CHUNK_BYTES: usize = 64;
@@ -72,4 +72,11 @@ pub enum Command {
     },
     /// Requests the settings; the outcome is [`Outcome::Settings`](super::Outcome::Settings).
     GetSettings,
+    /// Names a vertex. Its former name is replaced.
+    Name {
+        /// The vertex.
+        vertex: u8,
+        /// The name, which no other vertex has; [`Name::NONE`] clears the name.
+        name: Name,
+    },
 }

@@ -5,16 +5,18 @@ use core::fmt;
 use serde::{Deserialize, Deserializer, Serialize};
 
 use super::code::codes;
-use super::{Belief, Echoes, Evidence, Exploration, GoalStatus, Remapped, Reply, Start, Velocity, VertexWays, Worst};
+use super::{
+    Belief, Echoes, Evidence, Exploration, GoalStatus, Name, Remapped, Reply, Start, Velocity, VertexWays, Worst,
+};
 use crate::filter::{Filter, FilterCapacities, Update};
 use crate::mapper::MapperConfig;
 use crate::place::Fingerprint;
 
 /// The version of the messages and requests.
-pub const PROTOCOL_VERSION: u16 = 6;
+pub const PROTOCOL_VERSION: u16 = 7;
 
 /// The 64-bit FNV-1a hash of the schema in `docs/wire.md`; a test computes it from the types.
-pub const SCHEMA_HASH: u64 = 0x3BC2_F178_DFCA_A82F;
+pub const SCHEMA_HASH: u64 = 0xFF77_031D_62C1_94A5;
 
 /// A message from the robot. Every message but [`Message::Remapped`] gives absolute values, not increments.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -98,6 +100,18 @@ pub enum Message {
     Ways(VertexWays),
     /// How far the map is explored, from a filter that knows the ways.
     Exploration(Exploration),
+    /// The name of a vertex.
+    Name {
+        /// The vertex.
+        vertex: u8,
+        /// Its name.
+        name: Name,
+    },
+    /// The vertices with a name; the others have none.
+    Named {
+        /// The vertices as a set of bits.
+        vertices: u64,
+    },
 }
 
 /// The introduction of a robot.
@@ -157,7 +171,7 @@ codes! {
     /// Why a robot started.
     ResetCause {
         /// The cause is unknown.
-        Unknown => "for an unknown reason",
+        Unknown => "the cause is unknown",
         /// The power was switched on.
         PowerOn = 1 => "the power was switched on",
         /// The supply voltage fell too low.

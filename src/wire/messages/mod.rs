@@ -7,6 +7,7 @@ mod echoes;
 mod evidence;
 mod list;
 mod message;
+mod name;
 mod navigation;
 mod payload;
 mod reply;
@@ -21,6 +22,7 @@ pub use list::List;
 pub use message::{
     Capacities, Health, Hello, HelloError, Location, Message, PROTOCOL_VERSION, ResetCause, Row, SCHEMA_HASH,
 };
+pub use name::{NAME_BYTES, Name, NameError};
 pub use navigation::{GoalState, GoalStatus, Velocity};
 pub use payload::{Clock, Payload, Start};
 pub use reply::{Info, Outcome, Refusal, Reply, Version};

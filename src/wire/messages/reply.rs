@@ -109,7 +109,7 @@ codes! {
     /// Why a request was refused.
     Refusal {
         /// A reason that this version does not know.
-        Other => "for an unknown reason",
+        Other => "the reason is unknown",
         /// The robot does not support the command.
         Unsupported = 1 => "this robot does not support the command",
         /// A value is out of its range.
@@ -134,6 +134,10 @@ codes! {
         Busy = 11 => "another operation must finish first",
         /// A recording is played, and it takes no commands.
         Recording = 12 => "it is a recording, not a robot",
+        /// The text is no name: too long, a number, or with characters that a name cannot have.
+        BadName = 13 => "a name has 1 to 16 bytes of UTF-8, no control characters, no space at its ends, and is not a number",
+        /// Another vertex has the name.
+        NameTaken = 14 => "another vertex has this name",
     }
 }
 

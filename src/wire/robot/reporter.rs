@@ -4,21 +4,22 @@ use core::fmt;
 
 use crate::fault::{FaultCounters, FaultKind};
 use crate::filter::{Filter, Update};
-use crate::map::Darts;
+use crate::map::{Darts, VertexId};
 use crate::mapper::Mapper;
 use crate::place::Place;
 use crate::wire::digest::{map_digest, row_of};
+use crate::wire::messages::bit;
 use crate::wire::robot::sent_map::SentMap;
 use crate::wire::{
-    Belief, Capacities, Evidence, Exploration, Hello, List, Location, Message, Remapped, ResetCause, Row, VertexWays,
-    Worst,
+    Belief, Capacities, Evidence, Exploration, Hello, List, Location, Message, Name, Names, Refusal, Remapped,
+    ResetCause, Row, VertexWays, Worst,
 };
 
 /// Decides which messages to send. It remembers what was sent, and passes each message to a callback, which returns
 /// whether the transmit queue accepted it. It never waits.
 ///
 /// A change whose message was refused is sent again with the next update or with the repeated map, whichever comes first. The
-/// caller sends `Health`, `Ring`, `Velocity` and `Reply` itself. Memory: 28 bytes per vertex and about 150 bytes.
+/// caller sends `Health`, `Ring`, `Velocity` and `Reply` itself. Memory: 42 bytes per vertex and about 170 bytes.
 #[derive(Clone, Debug)]
 pub struct Reporter<const V: usize> {
     hello: Hello,
@@ -31,6 +32,11 @@ pub struct Reporter<const V: usize> {
     belief: Option<Belief>,
     complete: bool,
     exploration: Option<Exploration>,
+    names: Names<V>,
+    /// The names that have changed and were not sent yet.
+    unsent_names: u64,
+    /// Whether a vertex had a name since the start. Until then no message about names is sent.
+    had_names: bool,
     faults: [u32; FaultKind::ALL.len()],
     /// The next piece of the repeated map: a vertex, or one of the pieces after the last vertex.
     turn: u8,
@@ -67,6 +73,9 @@ impl<const V: usize> Reporter<V> {
             complete: false,
             // `None` is not all zero, so a `static` robot would not be in `.bss`.
             exploration: Some(Exploration { frontiers: 0, complete: false }),
+            names: Names::new(),
+            unsent_names: 0,
+            had_names: false,
             faults: [0; FaultKind::ALL.len()],
             turn: 0,
             fault_turn: 0,
@@ -86,6 +95,9 @@ impl<const V: usize> Reporter<V> {
         self.belief = None;
         self.complete = false;
         self.exploration = None;
+        self.names.clear();
+        self.unsent_names = 0;
+        self.had_names = false;
         self.faults = [0; FaultKind::ALL.len()];
         self.turn = 0;
         self.fault_turn = 0;
@@ -96,6 +108,34 @@ impl<const V: usize> Reporter<V> {
     /// Sets the session id of the `Hello`.
     pub fn set_session(&mut self, session: u32) {
         self.hello.session = session;
+    }
+
+    /// The names of the vertices.
+    pub const fn names(&self) -> &Names<V> {
+        &self.names
+    }
+
+    /// Names a vertex, or clears its name with [`Name::NONE`]; the next tick sends it.
+    ///
+    /// # Errors
+    /// As [`Names::set`].
+    pub fn set_name(&mut self, vertex: u8, name: Name) -> Result<(), Refusal> {
+        self.names.set(vertex, name)?;
+        self.unsent_names |= bit(vertex);
+        self.had_names |= !name.is_none();
+        Ok(())
+    }
+
+    /// Changes all names, as the restore of a snapshot does, and sends them again.
+    pub(crate) fn change_names<R>(&mut self, change: impl FnOnce(&mut Names<V>) -> R) -> R {
+        let changed = change(&mut self.names);
+        self.send_all_names();
+        changed
+    }
+
+    fn send_all_names(&mut self) {
+        self.unsent_names = self.names.vertices();
+        self.had_names |= self.unsent_names != 0;
     }
 
     /// Starts a new round of the repeated map with a `Hello`, at four pieces per tick; the next round has the usual pace
@@ -181,8 +221,11 @@ impl<const V: usize> Reporter<V> {
     ) {
         let map = filter.map();
         let remapped = Remapped::of(filter, self.vertices_before, update.place_index);
+        let is_first = self.vertices_before == 0;
         self.vertices_before = map.vertices().len() as u8;
         let mut changed = false;
+        self.names.remap(|before| filter.remapped(VertexId::new(before)?).map(u8::from));
+        self.names.truncate(map.vertices().len());
         // If the queue refuses it, the listener keeps the old ids, and so does the record of what was sent; the messages
         // below send the difference.
         if let Some(remapped) = remapped
@@ -190,6 +233,8 @@ impl<const V: usize> Reporter<V> {
         {
             changed = true;
             self.note_remapped(&remapped);
+        } else if remapped.is_some() || is_first || self.unsent_names != 0 {
+            self.send_all_names();
         }
         let sent_vertices = self.sent.vertices();
         let vertices = map.vertices().len() as u8;
@@ -271,6 +316,7 @@ impl<const V: usize> Reporter<V> {
         if self.exploration != exploration {
             self.send_exploration(exploration, &mut send);
         }
+        self.send_changed_name(&mut send);
         for _ in 0..if self.sends_full { Self::PIECES_PER_FULL_TICK } else { 1 } {
             if !self.send_piece(filter, faults, &mut send) {
                 return;
@@ -297,10 +343,10 @@ impl<const V: usize> Reporter<V> {
                 (Some(vertex), Some(darts)) if self.turn >= vertices => {
                     self.send_ways(&VertexWays::of(darts, vertex), send)
                 }
-                (Some(vertex), _) => self.send_row(row_of(map, vertex), send),
+                (Some(vertex), _) => self.send_row(row_of(map, vertex), send) && self.send_name(vertex.into(), send),
                 (None, _) => true,
             },
-            Some(0) => self.send_size(filter, send),
+            Some(0) => self.send_named(send) && self.send_size(filter, send),
             Some(1) => self.location.is_none_or(|location| self.send(&Message::Location(location), send)),
             Some(2) => self.belief.is_none_or(|belief| self.send(&Message::Belief(belief), send)),
             Some(3) => self.send_exploration(darts.map(|darts| self.explored(darts)), send),
@@ -334,6 +380,30 @@ impl<const V: usize> Reporter<V> {
             self.sent.set_ways(ways);
         }
         taken
+    }
+
+    /// Sends one of the changed names.
+    fn send_changed_name(&mut self, send: &mut impl FnMut(&Message) -> Result<(), QueueFull>) {
+        let vertex = self.unsent_names.trailing_zeros() as u8;
+        let is_sent = match self.names.get(vertex).is_none() {
+            _ if self.unsent_names == 0 => return,
+            true => self.send_named(send),
+            false => self.send_name(vertex, send),
+        };
+        if is_sent {
+            self.unsent_names &= !bit(vertex);
+        }
+    }
+
+    /// Returns whether the vertex has no name or the queue accepted it.
+    fn send_name(&mut self, vertex: u8, send: &mut impl FnMut(&Message) -> Result<(), QueueFull>) -> bool {
+        let name = self.names.get(vertex);
+        name.is_none() || self.send(&Message::Name { vertex, name }, send)
+    }
+
+    /// Sends which vertices have a name, so that a listener clears the others. Returns whether the queue accepted it.
+    fn send_named(&mut self, send: &mut impl FnMut(&Message) -> Result<(), QueueFull>) -> bool {
+        !self.had_names || self.send(&Message::Named { vertices: self.names.vertices() }, send)
     }
 
     fn explored(&self, darts: Darts<'_>) -> Exploration {

@@ -4,11 +4,26 @@ use crate::wire::messages::bit;
 use crate::wire::robot::sent_ways::SentWays;
 use crate::wire::{Remapped, Row, VertexWays};
 
+/// A radius and a number of visits. Without a `u32` it takes no padding.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+struct SentLabel {
+    radius_mm: u16,
+    visits: [u16; 2],
+}
+
+impl SentLabel {
+    const NONE: Self = Self { radius_mm: 0, visits: [0; 2] };
+
+    const fn of(row: &Row) -> Self {
+        Self { radius_mm: row.radius_mm, visits: [row.visits as u16, (row.visits >> 16) as u16] }
+    }
+}
+
 /// The vertices, edges and ways that the transmit queue has accepted.
 #[derive(Clone, Debug)]
 pub(super) struct SentMap<const V: usize> {
     vertices: u8,
-    labels: [(u16, u32); V],
+    labels: [SentLabel; V],
     neighbours: [u64; V],
     ways: [SentWays; V],
 }
@@ -16,7 +31,7 @@ pub(super) struct SentMap<const V: usize> {
 impl<const V: usize> SentMap<V> {
     /// Nothing was sent.
     pub(super) const fn new() -> Self {
-        Self { vertices: 0, labels: [(0, 0); V], neighbours: [0; V], ways: [SentWays::NONE; V] }
+        Self { vertices: 0, labels: [SentLabel::NONE; V], neighbours: [0; V], ways: [SentWays::NONE; V] }
     }
 
     /// Forgets everything that was sent.
@@ -43,7 +58,7 @@ impl<const V: usize> SentMap<V> {
 
     /// Whether the label and the visits of the vertex were sent.
     pub(super) fn has_label(&self, row: &Row) -> bool {
-        row.vertex < self.vertices && self.labels.get(usize::from(row.vertex)) == Some(&(row.radius_mm, row.visits))
+        row.vertex < self.vertices && self.labels.get(usize::from(row.vertex)) == Some(&SentLabel::of(row))
     }
 
     /// Whether the ways of the vertex were sent.
@@ -53,7 +68,7 @@ impl<const V: usize> SentMap<V> {
 
     pub(super) fn set_label(&mut self, row: &Row) {
         if let Some(label) = self.labels.get_mut(usize::from(row.vertex)) {
-            *label = (row.radius_mm, row.visits);
+            *label = SentLabel::of(row);
         }
     }
 
@@ -82,7 +97,7 @@ impl<const V: usize> SentMap<V> {
     /// Renumbers, merges and removes vertices as the listener does.
     pub(super) fn remap(&mut self, remapped: &Remapped) {
         let labelled = bit(self.vertices).wrapping_sub(1);
-        remapped.apply(&mut self.labels, &mut self.neighbours, labelled);
+        remapped.apply(&mut self.labels, SentLabel::NONE, &mut self.neighbours, labelled);
         remapped.apply_to_ways(&mut self.ways, SentWays::NONE, |ways| ways.remap(remapped));
         self.vertices = remapped.count(self.vertices).min(V as u8);
     }

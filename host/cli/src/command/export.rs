@@ -21,8 +21,8 @@ use toposlam_link::topology::TopologicalMap;
 /// Arguments of `toposlam export`.
 #[derive(Args)]
 pub(crate) struct Arguments {
-    /// Source of the map: serial port of a robot, tcp:HOST:PORT, recording (FILE.mcap, feature `recording`), JSON of this command or a
-    /// snapshot, file with the bytes of a line, or - for such bytes on the standard input.
+    /// Source of the map: serial port of a robot, tcp:HOST:PORT, recording (FILE.mcap, feature `recording`), JSON, GeoJSON or GraphML of
+    /// this command, a snapshot, file with the bytes of a line, or - for such bytes on the standard input.
     source: OsString,
     /// Output format.
     #[arg(long)]
@@ -65,6 +65,7 @@ pub(super) fn frame_mm(text: &str) -> Result<f64, String> {
 }
 
 pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
+    check_output(arguments.output.as_deref(), arguments.force)?;
     let (map, here) = read(&arguments.source, arguments.baud)?;
     let mut layout = Layout::new();
     layout.arrange(&map);
@@ -77,6 +78,11 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
         Format::Snapshot => import::known_map(&map)?,
     };
     output::write(arguments.output.as_deref(), &bytes, arguments.force)
+}
+
+/// Fails if the output exists already, before the source is read.
+pub(super) fn check_output(file: Option<&Path>, force: bool) -> anyhow::Result<()> {
+    file.map_or(Ok(()), |file| output::check(file, force))
 }
 
 /// Warns of what makes the map doubtful.
@@ -108,18 +114,28 @@ pub(crate) fn read(source: &OsStr, baud: u32) -> anyhow::Result<(TopologicalMap,
         let name = source.to_str().with_context(|| format!("{}: no such file", path.display()))?;
         requested(line::open(name, baud)?)?
     };
+    let counters = listener.counters();
+    ensure!(
+        counters.messages + counters.unknown() > 0,
+        "{}: no message of a robot, and no map in JSON, GeoJSON, GraphML or a snapshot",
+        source.display()
+    );
     complain(&listener);
     let map = listener.map();
     ensure!(!map.vertices.is_empty(), "{}: no map received", source.display());
+    complain_of_gaps(&listener);
     Ok((map, listener.replica().location().map(|location| location.vertex)))
 }
 
-/// The map of a file in JSON or of a snapshot; `None` for other bytes.
+/// The map of a file in JSON, GeoJSON or GraphML, or of a snapshot; `None` for other bytes.
 fn imported(bytes: &[u8]) -> anyhow::Result<Option<TopologicalMap>> {
-    if bytes.trim_ascii_start().starts_with(b"{") {
-        return Ok(Some(import::json(std::str::from_utf8(bytes)?)?));
+    match bytes.trim_ascii_start().first() {
+        Some(b'{') => Ok(Some(import::json(std::str::from_utf8(bytes)?)?)),
+        Some(b'<') => Ok(Some(import::graphml(std::str::from_utf8(bytes)?)?)),
+        // The bytes of a line do not begin as a snapshot does.
+        _ if bytes.starts_with(b"TSLM") => Ok(Some(import::snapshot(bytes)?)),
+        _ => Ok(None),
     }
-    Ok(import::snapshot(bytes).ok())
 }
 
 /// The state of a robot with its whole map.
@@ -141,7 +157,6 @@ fn recorded(mut bytes: impl Read) -> io::Result<Listener> {
             Err(error) => return Err(error),
         }
     }
-    complain_of_gaps(&listener);
     Ok(listener)
 }
 
@@ -152,7 +167,6 @@ fn replayed(path: &Path) -> Result<Listener, RecordingError> {
     for bytes in recording::frames(path)? {
         listener.feed(&bytes?, |_, _| ());
     }
-    complain_of_gaps(&listener);
     Ok(listener)
 }
 

@@ -221,6 +221,7 @@ impl Model {
             'l' => Ok(Command::LocaliseOnly { on: true }),
             'm' => Ok(Command::LocaliseOnly { on: false }),
             'g' => Err(Question::GoTo),
+            'n' => Err(Question::Name),
             's' => Err(Question::Snapshot),
             'r' => Err(Question::Restore),
             't' => Err(Question::Setting),
@@ -245,7 +246,7 @@ impl Model {
             KeyCode::Char(character) => self.prompt.as_mut()?.push(character),
             KeyCode::Backspace => self.prompt.as_mut()?.pop(),
             KeyCode::Esc => self.prompt = None,
-            KeyCode::Enter => match self.prompt.take()?.answer() {
+            KeyCode::Enter => match self.prompt.take()?.answer(self.watch.map()) {
                 Ok(task) => return self.start(task),
                 Err(why) => self.show_problem(why),
             },

@@ -1,11 +1,12 @@
-//! Prompts of the monitor: for a vertex, a file, a setting, or a confirmation.
+//! Prompts of the monitor: for a vertex, a name, a file, a setting, or a confirmation.
 
 use std::path::PathBuf;
 
-use toposlam::wire::Command;
+use toposlam::wire::{Command, Name};
 
 use toposlam_link::link::Task;
 use toposlam_link::setting;
+use toposlam_link::topology::TopologicalMap;
 
 /// A prompt and the text typed so far.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -18,6 +19,7 @@ pub(super) struct Prompt {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Question {
     GoTo,
+    Name,
     Snapshot,
     Restore,
     Setting,
@@ -41,6 +43,7 @@ impl Prompt {
     pub(super) fn question(&self) -> String {
         match self.question {
             Question::GoTo => "go to which vertex? ".to_owned(),
+            Question::Name => "VERTEX NAME, without a name to clear it: ".to_owned(),
             Question::Snapshot => "snapshot to which file [--force]? ".to_owned(),
             Question::Restore => "restore from which file? ".to_owned(),
             Question::Setting => "set NAME VALUE: ".to_owned(),
@@ -52,16 +55,24 @@ impl Prompt {
         &self.text
     }
 
-    /// The task for the typed text, or why the text is invalid.
-    pub(super) fn answer(&self) -> Result<Task, String> {
+    /// The task for the typed text, or why the text is invalid. Vertices are those of `map`.
+    pub(super) fn answer(&self, map: &TopologicalMap) -> Result<Task, String> {
         let text = self.text.trim();
         if text.is_empty() {
             return Err("nothing was typed".to_owned());
         }
         match self.question {
             Question::GoTo => {
-                let vertex = text.parse().map_err(|_| format!("`{text}` is no number of a vertex"))?;
+                let vertex = map.find_vertex(text).ok_or_else(|| format!("the map has no vertex `{text}`"))?;
                 Ok(Task::Command(Command::GoTo { vertex }))
+            }
+            Question::Name => {
+                let (vertex, name) = text.split_once(' ').unwrap_or((text, ""));
+                // A name may have spaces: a known one counts as a whole.
+                let (vertex, name) = if map.find_vertex(text).is_some() { (text, "") } else { (vertex, name.trim()) };
+                let vertex = map.find_vertex(vertex).ok_or_else(|| format!("the map has no vertex `{vertex}`"))?;
+                let name = if name.is_empty() { Ok(Name::NONE) } else { Name::new(name) };
+                Ok(Task::Command(Command::Name { vertex, name: name.map_err(|error| error.to_string())? }))
             }
             Question::Snapshot => {
                 let (file, force) = text.strip_suffix(" --force").map_or((text, false), |file| (file.trim_end(), true));
@@ -85,17 +96,31 @@ impl Prompt {
 mod tests {
     use super::*;
     use toposlam::wire::Setting;
+    use toposlam_link::topology::Vertex;
 
     fn answer(question: Question, text: &str) -> Result<Task, String> {
         let mut prompt = Prompt::new(question);
         text.chars().for_each(|character| prompt.push(character));
-        prompt.answer()
+        prompt.answer(&map())
+    }
+
+    fn map() -> TopologicalMap {
+        let names = [(1, "hall".to_owned()), (2, "far end".to_owned())].into();
+        TopologicalMap { vertices: vec![Vertex::default(); 4], names, ..TopologicalMap::default() }
     }
 
     #[test]
     fn a_typed_answer_becomes_a_task_or_an_error() {
         assert_eq!(answer(Question::GoTo, "3"), Ok(Task::Command(Command::GoTo { vertex: 3 })));
+        assert_eq!(answer(Question::GoTo, "hall"), Ok(Task::Command(Command::GoTo { vertex: 1 })));
         assert!(answer(Question::GoTo, "256").unwrap_err().contains("256"));
+        assert!(answer(Question::GoTo, "cellar").unwrap_err().contains("no vertex `cellar`"));
+        let named = |vertex, name| Ok(Task::Command(Command::Name { vertex, name }));
+        assert_eq!(answer(Question::Name, "3 far hall"), named(3, Name::new("far hall").unwrap()));
+        assert_eq!(answer(Question::Name, "hall lobby"), named(1, Name::new("lobby").unwrap()));
+        assert_eq!(answer(Question::Name, "far end"), named(2, Name::NONE));
+        assert!(answer(Question::Name, "3 4").unwrap_err().contains("number"));
+        assert!(answer(Question::Name, "cellar hall").unwrap_err().contains("no vertex `cellar`"));
         assert_eq!(answer(Question::Snapshot, " a b "), Ok(Task::Snapshot { file: "a b".into(), force: false }));
         let replacing = Task::Snapshot { file: "a b".into(), force: true };
         assert_eq!(answer(Question::Snapshot, "a b  --force"), Ok(replacing));

@@ -128,7 +128,8 @@ pub fn draw(plan: &Plan, truth: &TrueMap, drawing: &Drawing) -> String {
         .map(|(point, vertex)| Mark {
             at: at(point),
             radius_mm: vertex.radius_mm,
-            name: vertex.name.clone(),
+            number: vertex.name.clone(),
+            name: String::new(),
             is_here: false,
         })
         .collect();

@@ -287,11 +287,13 @@ fn changes_map(event: Event<'_>) -> bool {
                 | Message::Exploration(_)
                 | Message::Location(_)
                 | Message::Remapped(_)
+                | Message::Name { .. }
+                | Message::Named { .. }
         )
     )
 }
 
-/// A map as JSON: `vertices`, each with `vertex`, `radius_mm` and `visits`; `edges`, each a pair of vertices;
+/// A map as JSON: `vertices`, each with `vertex`, `radius_mm`, `visits` and, if it has one, its `name`; `edges`, each a pair of vertices;
 /// `location`, `null` or the robot's `vertex` and the `place_index` of its last place; `digest`, the robot's digest of the map;
 /// and if the robot knows ways `ways`, those of each vertex with the fields of `docs/wire.md`, and `exploration`, its `frontiers`
 /// and whether it is `complete`.
@@ -299,7 +301,13 @@ pub fn map_json(listener: &Listener) -> Value {
     let map = listener.map();
     let vertices: Vec<Value> = (0_u8..)
         .zip(&map.vertices)
-        .map(|(vertex, label)| json!({"vertex": vertex, "radius_mm": label.radius_mm, "visits": label.visits}))
+        .map(|(vertex, label)| {
+            let mut object = json!({"vertex": vertex, "radius_mm": label.radius_mm, "visits": label.visits});
+            if let Some(name) = map.names.get(&vertex) {
+                object["name"] = json!(name);
+            }
+            object
+        })
         .collect();
     let location = listener
         .replica()

@@ -25,7 +25,7 @@ pub struct State {
     /// The line and its connection, the map with its layout, the robot's possible vertices and the evidence for them,
     /// the status of its goal, and its faults.
     ///
-    /// `edges` are pairs of vertices. `lines` are the drawings of all edges, parallel ones and loops included: the two `vertices`,
+    /// `vertices` have a `name`, `null` without one. `edges` are pairs of vertices. `lines` are the drawings of all edges, parallel ones and loops included: the two `vertices`,
     /// the positions of the two `ways` or `null`, and the points of the `line`; one point for a self-loop of a robot that knows
     /// edges only. `ways` are those of each vertex with the fields of `docs/wire.md`, `frontiers` those that nobody has driven, each
     /// with its drawing.
@@ -60,6 +60,7 @@ fn map(watch: &Watch) -> Value {
                 "y": thousandths(point.y),
                 "radius_mm": vertex.radius_mm,
                 "visits": vertex.visits,
+                "name": map.names.get(&(number as u8)),
             })
         })
         .collect();

@@ -9,7 +9,7 @@ use crate::topology::{TopologicalMap, Vertex, WayEdge};
 /// Approximate length of an edge, in Graphviz points (72 per inch).
 const POINTS_PER_EDGE: f64 = 144.0;
 
-/// The map as an undirected DOT graph: nodes `0`, `1`, … with `label`, `radius_mm`, `visits` and `pos`, and `ways` and
+/// The map as an undirected DOT graph: nodes `0`, `1`, … with `label`, `name` if it has one, `radius_mm`, `visits` and `pos`, and `ways` and
 /// `frontiers` if the map has ways; edges then with `tail_way`, `head_way` and `travel_frames`. The robot's vertex has a double
 /// rim.
 pub fn dot(map: &TopologicalMap, layout: &Layout, here: Option<u8>) -> String {
@@ -17,10 +17,14 @@ pub fn dot(map: &TopologicalMap, layout: &Layout, here: Option<u8>) -> String {
     let node = |_: &UnGraph<Vertex, Option<WayEdge>>, (node, vertex): (NodeIndex, &Vertex)| {
         let index = node.index();
         let Vertex { radius_mm, visits } = vertex;
+        let text = quoted(&map.vertex_text(index as u8));
         let mut attributes = format!(
-            "label = \"{index}\\n{:.2} m\" radius_mm = {radius_mm} visits = {visits}",
+            "label = \"{text}\\n{:.2} m\" radius_mm = {radius_mm} visits = {visits}",
             f64::from(*radius_mm) / 1000.0
         );
+        if let Some(name) = map.names.get(&(index as u8)) {
+            attributes += &format!(" name = \"{}\"", quoted(name));
+        }
         if let Some(ways) = map.ways.get(index) {
             let frontiers: Vec<String> = map.frontiers_of(index as u8).iter().map(u8::to_string).collect();
             attributes += &format!(" ways = {} frontiers = \"{}\"", ways.len(), frontiers.join(" "));
@@ -41,6 +45,11 @@ pub fn dot(map: &TopologicalMap, layout: &Layout, here: Option<u8>) -> String {
     };
     let config = [Config::NodeNoLabel, Config::EdgeNoLabel];
     format!("{:?}", Dot::with_attr_getters(&graph, &config, &edge, &node))
+}
+
+/// Text between quotation marks.
+fn quoted(text: &str) -> String {
+    text.replace('\\', "\\\\").replace('"', "\\\"")
 }
 
 #[cfg(test)]

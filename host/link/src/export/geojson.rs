@@ -10,7 +10,8 @@ use crate::topology::TopologicalMap;
 ///
 /// Points have `id` and `frame`; lines have `id`, `startid` and `endid`. Every feature has a unique `id`, as Nav2
 /// requires. The `metadata` of a vertex is `radius_m`, `visits`, `robot_is_here` and `has_self_loop`, and if the map has ways
-/// `ways`, their number, and `frontiers`, the positions of those that nobody has driven. The `metadata` of a line is then
+/// `ways`, their number, their `bearings_mrad`, and `frontiers`, the positions of those that nobody has driven; with self-loops
+/// `self_loop_ways`, the two ways of each, and `self_loop_frames`, its travel time or 0. A vertex with a name has a `name`. The `metadata` of a line is then
 /// `start_way`, `end_way` and, if it is known, `travel_frames`. Self-loops are not exported as lines. The coordinates are those
 /// of the drawing, in metres, with edges about `edge_m` long; they are not positions in the building.
 ///
@@ -28,7 +29,17 @@ pub fn geojson(map: &TopologicalMap, layout: &Layout, here: Option<u8>, edge_m: 
         });
         if let Some(ways) = map.ways.get(usize::from(vertex)) {
             metadata["ways"] = ways.len().into();
+            metadata["bearings_mrad"] = ways.iter().map(|way| way.bearing_mrad).collect();
             metadata["frontiers"] = map.frontiers_of(vertex).into();
+        }
+        if let Some(name) = map.names.get(&vertex) {
+            metadata["name"] = json!(name);
+        }
+        // They have no lines.
+        let loops = || map.way_edges().filter(|edge| edge.ends.iter().all(|end| end.vertex == vertex));
+        if loops().next().is_some() {
+            metadata["self_loop_ways"] = loops().flat_map(|edge| edge.ends.map(|end| end.way)).collect();
+            metadata["self_loop_frames"] = loops().map(|edge| edge.travel_frames.unwrap_or(0)).collect();
         }
         feature("Point", position(point), json!({"id": vertex, "frame": "map", "metadata": metadata}))
     });

@@ -9,13 +9,13 @@ use crate::topology::{TopologicalMap, WayEdge};
 const KEYS: [(&str, &str); 5] =
     [("radius_mm", "int"), ("visits", "long"), ("x", "double"), ("y", "double"), ("robot_is_here", "boolean")];
 /// Further ones of a map with ways.
-const WAY_KEYS: [(&str, &str); 2] = [("ways", "int"), ("frontiers", "string")];
+const WAY_KEYS: [(&str, &str); 3] = [("ways", "int"), ("frontiers", "string"), ("bearings_mrad", "string")];
 /// Attributes of the edges of a map with ways.
 const EDGE_KEYS: [(&str, &str); 3] = [("source_way", "int"), ("target_way", "int"), ("travel_frames", "int")];
 
 /// The map as GraphML: an undirected graph with nodes `0`, `1`, … and their attributes `radius_mm`, `visits`, `x`, `y`
-/// and `robot_is_here`. If the map has ways, nodes have `ways`, their number, and `frontiers`, the positions of those that nobody
-/// has driven; edges have `source_way`, `target_way` and `travel_frames`.
+/// and `robot_is_here`, and `name` if it has one. If the map has ways, nodes have `ways`, their number, `frontiers`, the positions
+/// of those that nobody has driven, and `bearings_mrad`; edges have `source_way`, `target_way` and `travel_frames`.
 pub fn graphml(map: &TopologicalMap, layout: &Layout, here: Option<u8>) -> String {
     let mut text = String::from(
         "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n<graphml xmlns=\"http://graphml.graphdrawing.org/xmlns\">\n",
@@ -26,6 +26,9 @@ pub fn graphml(map: &TopologicalMap, layout: &Layout, here: Option<u8>) -> Strin
     }
     for (name, kind) in EDGE_KEYS.iter().filter(|_| way_keys > 0) {
         let _ = writeln!(text, "  <key id=\"{name}\" for=\"edge\" attr.name=\"{name}\" attr.type=\"{kind}\"/>");
+    }
+    if !map.names.is_empty() {
+        text += "  <key id=\"name\" for=\"node\" attr.name=\"name\" attr.type=\"string\"/>\n";
     }
     text += "  <graph id=\"map\" edgedefault=\"undirected\">\n";
     for ((index, vertex), point) in map.vertices.iter().enumerate().zip(layout.points()) {
@@ -39,11 +42,15 @@ pub fn graphml(map: &TopologicalMap, layout: &Layout, here: Option<u8>) -> Strin
         ];
         if let Some(ways) = map.ways.get(index) {
             let frontiers: Vec<String> = map.frontiers_of(index as u8).iter().map(u8::to_string).collect();
-            values.extend([ways.len().to_string(), frontiers.join(" ")]);
+            let bearings: Vec<String> = ways.iter().map(|way| way.bearing_mrad.to_string()).collect();
+            values.extend([ways.len().to_string(), frontiers.join(" "), bearings.join(" ")]);
         }
         let _ = write!(text, "    <node id=\"{index}\">");
         for ((name, _), value) in KEYS.iter().chain(&WAY_KEYS).zip(values) {
             let _ = write!(text, "<data key=\"{name}\">{value}</data>");
+        }
+        if let Some(name) = map.names.get(&(index as u8)) {
+            let _ = write!(text, "<data key=\"name\">{}</data>", escaped(name));
         }
         text += "</node>\n";
     }
@@ -62,6 +69,11 @@ pub fn graphml(map: &TopologicalMap, layout: &Layout, here: Option<u8>) -> Strin
         text += "</edge>\n";
     }
     text + "  </graph>\n</graphml>\n"
+}
+
+/// Text in an element.
+fn escaped(text: &str) -> String {
+    text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;")
 }
 
 #[cfg(test)]

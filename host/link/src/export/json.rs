@@ -5,12 +5,17 @@ use serde_json::{Value, json};
 use crate::layout::{Layout, Point};
 use crate::topology::TopologicalMap;
 
-/// The map as a JSON object: `vertices` with `vertex`, `radius_mm`, `visits`, `x` and `y`; `edges` as pairs of
+/// The map as a JSON object: `vertices` with `vertex`, `radius_mm`, `visits`, `x`, `y` and, if it has one, its `name`; `edges` as pairs of
 /// vertices; `location`, the robot's vertex or null; and if the map has ways `ways`, those of each vertex, `way_edges`, each with
 /// `ends`, `travel_frames` and `line`, and `frontiers`, each with `vertex`, `way` and `line`.
 pub fn json(map: &TopologicalMap, layout: &Layout, here: Option<u8>) -> String {
     let vertices = map.vertices.iter().zip(layout.points()).enumerate().map(|(vertex, (label, point))| {
-        json!({"vertex": vertex, "radius_mm": label.radius_mm, "visits": label.visits, "x": point.x, "y": point.y})
+        let mut object =
+            json!({"vertex": vertex, "radius_mm": label.radius_mm, "visits": label.visits, "x": point.x, "y": point.y});
+        if let Some(name) = map.names.get(&(vertex as u8)) {
+            object["name"] = json!(name);
+        }
+        object
     });
     let mut object = json!({
         "format": "toposlam-map",

@@ -17,6 +17,8 @@ pub struct Mark {
     /// Radius of its fingerprint.
     pub radius_mm: f64,
     /// Text on the vertex.
+    pub number: String,
+    /// Text above the vertex; empty without a name.
     pub name: String,
     /// Whether the robot is at this vertex.
     pub is_here: bool,
@@ -68,9 +70,13 @@ pub fn dots(marks: &[Mark]) -> Group {
         let radius = words(&format!("{:.2} m", mark.radius_mm / 1000.0), x, y + DOT_MM + 320.0, 300.0);
         group = group
             .add(dot)
-            .add(words(&mark.name, x, y + 130.0, 380.0).set("fill", "white"))
+            .add(words(&mark.number, x, y + 130.0, 380.0).set("fill", "white"))
             // A white outline keeps the text legible over the edges.
             .add(radius.set("stroke", "white").set("stroke-width", 90).set("paint-order", "stroke"));
+        if !mark.name.is_empty() {
+            let name = words(&mark.name, x, y - DOT_MM - 170.0, 340.0);
+            group = group.add(name.set("stroke", "white").set("stroke-width", 90).set("paint-order", "stroke"));
+        }
     }
     group
 }
@@ -86,7 +92,8 @@ mod tests {
 
     #[test]
     fn a_self_loop_lies_in_the_widest_gap_between_edges() {
-        let mark = |x, y| Mark { at: (x, y), radius_mm: 1.0, name: String::new(), is_here: false };
+        let mark =
+            |x, y| Mark { at: (x, y), radius_mm: 1.0, number: String::new(), name: String::new(), is_here: false };
         let marks = [mark(0.0, 0.0), mark(9.0, 0.0), mark(0.0, 9.0), mark(0.0, -9.0)];
         let gap = widest_gap(&marks, &[(0, 0), (0, 1), (0, 2), (0, 3)], 0);
         assert!((gap.cos() + 1.0).abs() < 1e-9, "{gap}");

@@ -49,7 +49,8 @@ pub(crate) mod sample {
         ];
         let corner = vec![way(100, Some((0, 1)), None), way(1600, Some((0, 0)), Some(54))];
         let vertices = [900, 1200].map(|radius_mm| Vertex { radius_mm, visits: 7 }).to_vec();
-        let map = TopologicalMap { vertices, edges: vec![(0, 0), (0, 1)], ways: vec![hall, corner] };
+        let map =
+            TopologicalMap { vertices, edges: vec![(0, 0), (0, 1)], ways: vec![hall, corner], ..Default::default() };
         let mut layout = Layout::new();
         layout.arrange(&map);
         (map, layout)
@@ -59,7 +60,8 @@ pub(crate) mod sample {
     pub(crate) fn map() -> (TopologicalMap, Layout) {
         let radii_mm = [900, 1200, 640, 480];
         let vertices = radii_mm.map(|radius_mm| Vertex { radius_mm, visits: 7 }).to_vec();
-        let map = TopologicalMap { vertices, edges: vec![(0, 1), (0, 2), (1, 2), (2, 3), (3, 3)], ways: Vec::new() };
+        let map =
+            TopologicalMap { vertices, edges: vec![(0, 1), (0, 2), (1, 2), (2, 3), (3, 3)], ..Default::default() };
         let mut layout = Layout::new();
         layout.arrange(&map);
         (map, layout)

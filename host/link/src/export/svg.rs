@@ -5,13 +5,14 @@ use svg::node::element::{Group, Line, Path, Rectangle, Title};
 
 use super::marks::{self, Mark};
 use crate::layout::{Layout, Point};
+use crate::plural::count;
 use crate::topology::TopologicalMap;
 
 /// Approximate length of an edge, in units of the document.
 const EDGE_MM: f64 = 2500.0;
 const MARGIN_MM: f64 = 1100.0;
 
-/// The map as an SVG document: each vertex with its number and radius. The robot's vertex has a blue rim. Loops and parallel edges
+/// The map as an SVG document: each vertex with its number, its name and its radius. The robot's vertex has a blue rim. Loops and parallel edges
 /// are curves, frontiers are dashed stubs.
 pub fn svg(map: &TopologicalMap, layout: &Layout, here: Option<u8>) -> String {
     let marks: Vec<Mark> = map
@@ -22,7 +23,8 @@ pub fn svg(map: &TopologicalMap, layout: &Layout, here: Option<u8>) -> String {
         .map(|(vertex, (label, point))| Mark {
             at: at(*point),
             radius_mm: label.radius_mm.into(),
-            name: vertex.to_string(),
+            number: vertex.to_string(),
+            name: map.names.get(&(vertex as u8)).cloned().unwrap_or_default(),
             is_here: here.map(usize::from) == Some(vertex),
         })
         .collect();
@@ -42,7 +44,11 @@ pub fn svg(map: &TopologicalMap, layout: &Layout, here: Option<u8>) -> String {
         .set("width", width / 25.0)
         .set("height", height / 25.0)
         .set("font-family", "sans-serif")
-        .add(Title::new(format!("Map of {} vertices and {} edges", map.vertices.len(), map.all_edges().len())))
+        .add(Title::new(format!(
+            "Map of {} and {}",
+            count(map.vertices.len(), "vertex", "vertices"),
+            count(map.all_edges().len(), "edge", "edges")
+        )))
         .add(background.set("fill", "white"))
         .add(lines)
         .add(marks::dots(&marks));

@@ -9,7 +9,7 @@
 //! use toposlam_link::topology::{TopologicalMap, Vertex};
 //!
 //! let mut layout = Layout::new();
-//! let mut map = TopologicalMap { vertices: vec![Vertex::default(); 3], edges: vec![(0, 1), (1, 2)], ways: vec![] };
+//! let mut map = TopologicalMap { vertices: vec![Vertex::default(); 3], edges: vec![(0, 1), (1, 2)], ..Default::default() };
 //! layout.arrange(&map);
 //! let before = layout.points().to_vec();
 //! map.vertices.push(Vertex::default());

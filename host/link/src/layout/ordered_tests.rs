@@ -17,7 +17,7 @@ fn topology(darts: &Darts) -> TopologicalMap {
     let vertices = VertexId::first(darts.vertices().into());
     let ways = vertices.map(|vertex| VertexWays::of(darts.view(), vertex).ways.as_slice().to_vec()).collect();
     let vertices = vec![Vertex::default(); darts.vertices().into()];
-    let mut map = TopologicalMap { vertices, edges: Vec::new(), ways };
+    let mut map = TopologicalMap { vertices, edges: Vec::new(), ways, ..Default::default() };
     map.edges =
         map.way_edges().map(|edge| edge.ends.map(|end| end.vertex)).map(|[a, b]| (a.min(b), a.max(b))).collect();
     map.edges.sort_unstable();

@@ -17,7 +17,7 @@ fn map(vertices: u8, edges: impl IntoIterator<Item = (u8, u8)>) -> TopologicalMa
     TopologicalMap {
         vertices: vec![Vertex::default(); vertices.into()],
         edges: edges.into_iter().collect(),
-        ways: Vec::new(),
+        ..TopologicalMap::default()
     }
 }
 

@@ -42,6 +42,8 @@ impl fmt::Display for Task {
             Self::Command(Command::LocaliseOnly { on: true }) => f.write_str("localise only"),
             Self::Command(Command::LocaliseOnly { on: false }) => f.write_str("continue mapping"),
             Self::Command(Command::GoTo { vertex }) => write!(f, "go to {vertex}"),
+            Self::Command(Command::Name { vertex, name }) if name.is_none() => write!(f, "clear the name of {vertex}"),
+            Self::Command(Command::Name { vertex, name }) => write!(f, "name {vertex} {name}"),
             Self::Command(Command::Explore) => f.write_str("explore"),
             Self::Command(Command::Pause { on: true }) => f.write_str("pause"),
             Self::Command(Command::Pause { on: false }) => f.write_str("resume"),

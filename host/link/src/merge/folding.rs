@@ -21,10 +21,12 @@ struct Draft {
     travel_frames: Option<u16>,
 }
 
-/// Merges two maps by an alignment. Where the maps contradict each other, the first one is right.
+/// Merges two maps by an alignment. Where the maps contradict each other, the first one is right,
+/// in names as well.
 pub(super) fn fold(first: &TopologicalMap, second: &TopologicalMap, alignment: &Alignment) -> TopologicalMap {
     let source = |way: WayId| alignment.origin_of_way(way).map_or(Source::Second(way), Source::First);
     let mut vertices = first.vertices.clone();
+    let mut names = first.names.clone();
     let mut drafts: Vec<Vec<Draft>> = Vec::new();
     for (vertex, ways) in (0..).zip(&first.ways) {
         let of_first = (0..).zip(ways).map(|(way, data)| Draft {
@@ -48,6 +50,11 @@ pub(super) fn fold(first: &TopologicalMap, second: &TopologicalMap, alignment: &
                 (drafts.len() - 1, 0.0)
             }
         };
+        if let Some(name) = second.names.get(&image)
+            && !names.values().any(|known| known == name)
+        {
+            names.entry(target as u8).or_insert_with(|| name.clone());
+        }
         for (way, data) in (0..).zip(ways) {
             let id = WayId { vertex: image, way };
             let leads_to = data.leads_to.map(source);
@@ -69,7 +76,7 @@ pub(super) fn fold(first: &TopologicalMap, second: &TopologicalMap, alignment: &
             }
         }
     }
-    numbered(vertices, drafts)
+    TopologicalMap { names, ..numbered(vertices, drafts) }
 }
 
 /// The mean of two labels, by their visits.
@@ -102,7 +109,7 @@ fn numbered(vertices: Vec<Vertex>, mut drafts: Vec<Vec<Draft>>) -> TopologicalMa
         }
     };
     let ways: Vec<Vec<Way>> = drafts.iter().map(|ways| ways.iter().map(finished).collect()).collect();
-    let mut map = TopologicalMap { vertices, edges: Vec::new(), ways };
+    let mut map = TopologicalMap { vertices, edges: Vec::new(), ways, ..Default::default() };
     let mut edges: Vec<(u8, u8)> = map.way_edges().map(|edge| (edge.ends[0].vertex, edge.ends[1].vertex)).collect();
     edges.sort_unstable();
     edges.dedup();

@@ -14,6 +14,7 @@
 //! ```
 
 mod alignment;
+mod buildings;
 mod evidence;
 mod folding;
 #[cfg(test)]
@@ -23,9 +24,11 @@ use std::collections::BTreeMap;
 use std::fmt;
 
 use alignment::Alignment;
+pub use buildings::{Building, buildings};
 use evidence::Background;
 pub use evidence::Evidence;
 
+use crate::plural::count;
 use crate::topology::TopologicalMap;
 
 /// An alignment with a smaller probability is refused.
@@ -71,9 +74,8 @@ pub enum MergeError {
     NoWays,
     /// No vertex of one map is like one of the other.
     NothingInCommon,
-    /// The best alignment is not certain enough, or contradicts itself: then one of the maps is wrong. It is reported with its
-    /// evidence.
-    Uncertain(Box<Part>),
+    /// The best alignment is not certain enough. It is reported with its evidence and the reason.
+    Uncertain(Doubt, Box<Part>),
     /// The merged map would have more vertices than a robot's map can have.
     TooManyVertices(usize),
 }
@@ -83,7 +85,7 @@ impl fmt::Display for MergeError {
         match self {
             Self::NoWays => f.write_str("a map has no ways; only the maps of the ordered filter can be merged"),
             Self::NothingInCommon => f.write_str("the maps have nothing in common"),
-            Self::Uncertain(part) => write!(f, "the common part is not certain, or one of the maps is wrong: {part}"),
+            Self::Uncertain(doubt, part) => write!(f, "the common part is not certain: {doubt}: {part}"),
             Self::TooManyVertices(count) => {
                 write!(f, "the merged map would have {count} vertices, but a map has at most {VERTICES_MAX}")
             }
@@ -93,21 +95,58 @@ impl fmt::Display for MergeError {
 
 impl std::error::Error for MergeError {}
 
+/// Why a common part is not certain.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Doubt {
+    /// A way leads to two vertices: one of the maps is wrong.
+    Contradiction,
+    /// Radii and travel times differ too much: one of the maps is wrong.
+    Misfit,
+    /// The evidence is too small.
+    LittleEvidence,
+    /// An alignment that contradicts it has much of its evidence: the building repeats itself, or is symmetric.
+    Repetition,
+    /// The alternatives are too probable.
+    Probability,
+    /// The maps can be drawn in the plane, and the merged one cannot.
+    Genus,
+}
+
+impl fmt::Display for Doubt {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Contradiction => "the maps contradict each other, so one of them is wrong",
+            Self::Misfit => "radii and travel times differ too much, so one of the maps is wrong",
+            Self::LittleEvidence => "the maps have too little in common; larger maps have more",
+            Self::Repetition => {
+                "the building is symmetric or repeats itself, and another alignment has more than half of the evidence"
+            }
+            Self::Probability => "the alternatives are too probable; larger maps tell them apart",
+            Self::Genus => "the merged map cannot be drawn in the plane, but both maps can",
+        })
+    }
+}
+
 impl Part {
-    fn is_certain(&self) -> bool {
+    /// Why the part is not certain; `None` if it is.
+    fn doubt(&self) -> Option<Doubt> {
         let nats = self.evidence.total();
-        self.probability >= LEAST_PROBABILITY
-            && nats >= LEAST_NATS
-            && self.rival_nats.is_none_or(|rival_nats| rival_nats <= RIVAL_SHARE * nats)
-            && self.evidence.contradictions == 0
-            && self.evidence.misfit() <= MISFIT_MAX
+        let repeats = self.rival_nats.is_some_and(|rival_nats| rival_nats > RIVAL_SHARE * nats);
+        let doubts = [
+            (self.evidence.contradictions > 0, Doubt::Contradiction),
+            (self.evidence.misfit() > MISFIT_MAX, Doubt::Misfit),
+            (nats < LEAST_NATS, Doubt::LittleEvidence),
+            (repeats, Doubt::Repetition),
+            (self.probability < LEAST_PROBABILITY, Doubt::Probability),
+        ];
+        doubts.into_iter().find(|(holds, _)| *holds).map(|(_, doubt)| doubt)
     }
 }
 
 impl fmt::Display for Part {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let percent = 100.0 * self.probability;
-        write!(f, "{} vertices, probability {percent:.1} %, {}", self.common.len(), self.evidence)?;
+        write!(f, "{}, probability {percent:.1} %, {}", count(self.common.len(), "vertex", "vertices"), self.evidence)?;
         match self.rival_nats {
             Some(nats) => write!(f, "; the best alternative has {nats:.1} nats"),
             None => f.write_str("; no alternative"),
@@ -134,14 +173,15 @@ pub fn merge(first: &TopologicalMap, second: &TopologicalMap) -> Result<Merged, 
     while let Some((alignment, part)) = best(&alignments, &whole) {
         let joined = whole.with(alignment);
         let folded = folding::fold(first, second, &joined);
-        if part.is_certain() && folding::genus(&folded) <= genus_max {
-            whole = joined;
-            merged = Some(folded);
-            parts.push(part);
-        } else if parts.is_empty() {
-            return Err(MergeError::Uncertain(Box::new(part)));
-        } else {
-            break;
+        let doubt = part.doubt().or_else(|| (folding::genus(&folded) > genus_max).then_some(Doubt::Genus));
+        match doubt {
+            None => {
+                whole = joined;
+                merged = Some(folded);
+                parts.push(part);
+            }
+            Some(doubt) if parts.is_empty() => return Err(MergeError::Uncertain(doubt, Box::new(part))),
+            Some(_) => break,
         }
     }
     let map = merged.ok_or(MergeError::NothingInCommon)?;

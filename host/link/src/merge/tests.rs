@@ -59,7 +59,8 @@ fn part(building: Building, places: &[usize], noise_mm: u16) -> TopologicalMap {
     let ways: Vec<Vec<Way>> =
         places.iter().map(|&place| directions(place).into_iter().map(|it| way(place, it)).collect()).collect();
     let vertex = |&place: &usize| Vertex { radius_mm: (building.radius_mm)(place) + noise_mm, visits: 4 };
-    let mut map = TopologicalMap { vertices: places.iter().map(vertex).collect(), edges: Vec::new(), ways };
+    let mut map =
+        TopologicalMap { vertices: places.iter().map(vertex).collect(), edges: Vec::new(), ways, ..Default::default() };
     map.edges = map.way_edges().map(|edge| (edge.ends[0].vertex, edge.ends[1].vertex)).collect();
     map.edges.iter_mut().for_each(|(a, b)| (*a, *b) = (*a.min(b), *a.max(b)));
     map.edges.sort_unstable();
@@ -103,7 +104,37 @@ fn a_map_merged_with_itself_stays_as_it_is() {
 #[test]
 fn halves_that_look_alike_everywhere_are_refused() {
     let result = merge(&part(UNIFORM, &columns(0..3, false), 0), &part(UNIFORM, &columns(1..5, true), 0));
-    assert!(matches!(result, Err(MergeError::Uncertain(_) | MergeError::NothingInCommon)), "{result:?}");
+    assert!(matches!(result, Err(MergeError::Uncertain(..) | MergeError::NothingInCommon)), "{result:?}");
+}
+
+#[test]
+fn a_symmetric_building_is_refused_as_such() {
+    // Turned by half a turn it is the same.
+    const SYMMETRIC: Building = Building {
+        radius_mm: |place| 700 + 90 * (if place < 7 { place } else { 14 - place }) as u16,
+        frames: |_, _| 60,
+    };
+    let whole = part(SYMMETRIC, &columns(0..5, false), 0);
+    let error = merge(&whole, &part(SYMMETRIC, &columns(0..5, true), 4)).unwrap_err();
+    assert!(matches!(error, MergeError::Uncertain(Doubt::Repetition, _)), "{error}");
+    assert!(error.to_string().contains("symmetric"), "{error}");
+}
+
+#[test]
+fn the_merged_map_has_the_names_of_both_and_the_first_one_is_right() {
+    let (west, east) = (columns(0..3, false), columns(1..5, true));
+    let (mut first, mut second) = (part(VARIED, &west, 0), part(VARIED, &east, 16));
+    let at = |places: &[usize], place: usize| places.iter().position(|&other| other == place).unwrap() as u8;
+    let (common, far) = (1, WIDTH - 1);
+    first.names = [(at(&west, common), "hall".to_owned()), (at(&west, 0), "door".to_owned())].into();
+    second.names = [(at(&east, common), "lobby".to_owned()), (at(&east, far), "roof".to_owned())].into();
+    let merged = merge(&first, &second).unwrap().map;
+    let names: Vec<&str> = merged.names.values().map(String::as_str).collect();
+    assert_eq!((names.len(), merged.names.get(&at(&west, common)).map(String::as_str)), (3, Some("hall")));
+    assert!(names.contains(&"roof") && names.contains(&"door"));
+    // A name of the first map is not given twice.
+    second.names = [(at(&east, far), "door".to_owned())].into();
+    assert_eq!(merge(&first, &second).unwrap().map.names, first.names);
 }
 
 #[test]
@@ -113,7 +144,7 @@ fn maps_of_different_buildings_are_refused() {
         frames: |a, b| 41 + 29 * ((a + 2 * b) % 7) as u16,
     };
     let result = merge(&part(VARIED, &columns(0..3, false), 0), &part(other, &columns(1..5, true), 0));
-    assert!(matches!(result, Err(MergeError::Uncertain(_) | MergeError::NothingInCommon)), "{result:?}");
+    assert!(matches!(result, Err(MergeError::Uncertain(..) | MergeError::NothingInCommon)), "{result:?}");
 }
 
 #[test]
@@ -126,7 +157,7 @@ fn an_edge_that_leads_elsewhere_is_a_contradiction() {
     for (from, to) in [(a, d), (d, a), (c, b), (b, c)] {
         wrong.ways[usize::from(from.vertex)][usize::from(from.way)].leads_to = Some(to);
     }
-    let Err(MergeError::Uncertain(part)) = merge(&good, &wrong) else { panic!("merged") };
+    let Err(MergeError::Uncertain(Doubt::Contradiction, part)) = merge(&good, &wrong) else { panic!("merged") };
     assert!(part.evidence.contradictions > 0, "{part}");
 }
 
@@ -135,4 +166,39 @@ fn maps_without_ways_are_refused_in_words() {
     let map = TopologicalMap { ways: Vec::new(), ..part(VARIED, &columns(0..2, false), 0) };
     let error = merge(&map, &map).unwrap_err();
     assert_eq!(error.to_string(), "a map has no ways; only the maps of the ordered filter can be merged");
+}
+
+#[test]
+fn the_maps_of_many_robots_are_one_map_per_building() {
+    let other = Building {
+        radius_mm: |place| 700 + 211 * (place * 4 % 15) as u16,
+        frames: |a, b| 41 + 29 * ((a + 2 * b) % 7) as u16,
+    };
+    let mut maps: Vec<(usize, TopologicalMap)> = [
+        part(VARIED, &columns(0..3, false), 0),
+        part(other, &columns(0..4, false), 0),
+        part(VARIED, &columns(1..5, true), 16),
+        part(other, &columns(1..5, true), 8),
+        TopologicalMap { ways: Vec::new(), ..part(VARIED, &columns(0..2, false), 0) },
+        part(VARIED, &columns(0..4, true), 4),
+    ]
+    .into_iter()
+    .enumerate()
+    .collect();
+    let merged = buildings(&maps);
+    let of = |buildings: &[super::Building]| {
+        buildings.iter().map(|building| (building.robots.clone(), building.map.vertices.len())).collect::<Vec<_>>()
+    };
+    assert_eq!(of(&merged), [(vec![1, 3], 15), (vec![0, 2, 5], 15)]);
+    // Whatever the order in which the maps come.
+    maps.reverse();
+    assert_eq!(buildings(&maps), merged);
+}
+
+#[test]
+fn the_map_of_a_robot_that_is_not_certain_to_be_in_a_building_stays_apart_with_the_reason() {
+    let maps = [part(UNIFORM, &columns(0..3, false), 0), part(UNIFORM, &columns(1..5, true), 0)];
+    let merged = buildings(&maps.into_iter().enumerate().collect::<Vec<_>>());
+    assert_eq!(merged.len(), 2);
+    assert!(matches!(merged[0].refused[..], [(1, MergeError::Uncertain(..))]), "{:?}", merged[0].refused);
 }

@@ -98,7 +98,7 @@ impl Scene<'_> {
             font_size: TEXT_PIXELS,
             scale_invariant: true,
             color: Some(TEXT_WHITE),
-            text: format!("{vertex}: {} mm", label.radius_mm),
+            text: format!("{}: {} mm", self.map.vertex_text(vertex as u8), label.radius_mm),
         }
     }
 
@@ -189,7 +189,7 @@ mod tests {
     #[test]
     fn each_vertex_is_a_disc_of_its_radius_and_the_robots_vertex_is_highlighted() {
         let vertices = [1200, 0].map(|radius_mm| Vertex { radius_mm, visits: 1 }).to_vec();
-        let map = TopologicalMap { vertices, edges: vec![(0, 1), (1, 1)], ways: Vec::new() };
+        let map = TopologicalMap { vertices, edges: vec![(0, 1), (1, 1)], ..Default::default() };
         let mut layout = Layout::new();
         layout.arrange(&map);
         let scene = Scene { map: &map, layout: &layout, robot: Some(1) };

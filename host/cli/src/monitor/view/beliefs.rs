@@ -7,6 +7,7 @@ use ratatui::text::{Line, Span};
 use super::{FAINT, HERE, boxed};
 use crate::monitor::model::Model;
 use toposlam_link::event_text::{distance, factors, nats};
+use toposlam_link::plural::count;
 
 pub(super) fn draw(frame: &mut Frame<'_>, area: Rect, model: &Model) {
     let listener = model.watch().listener();
@@ -15,7 +16,7 @@ pub(super) fn draw(frame: &mut Frame<'_>, area: Rect, model: &Model) {
     if let Some(location) = replica.location() {
         lines.push(Line::from(vec![
             Span::from("at "),
-            Span::styled(format!("vertex {}", location.vertex), HERE),
+            Span::styled(format!("vertex {}", model.watch().map().vertex_text(location.vertex)), HERE),
             Span::from(format!(" with place {}", location.place_index)),
         ]));
     }
@@ -31,9 +32,9 @@ pub(super) fn draw(frame: &mut Frame<'_>, area: Rect, model: &Model) {
         lines.push(Line::from(format!("consistency {}", distance(evidence.consistency_mm))));
         lines.push(Line::from(format!("ln: {}", factors(&evidence.factors))));
         lines.push(Line::from(format!(
-            "lead {:.2} nats, {} hypotheses",
+            "lead {:.2} nats, {}",
             nats(evidence.lead_q16),
-            evidence.distinct_hypotheses
+            count(evidence.distinct_hypotheses, "hypothesis", "hypotheses")
         )));
     }
     if let Some(worst) = replica.worst() {
@@ -42,7 +43,7 @@ pub(super) fn draw(frame: &mut Frame<'_>, area: Rect, model: &Model) {
         lines.push(Line::from(format!("worst {}: {}, {age} ago", distance(worst.distance_mm), walk.join("-"))));
     }
     if let Some(seen) = listener.sighting() {
-        let ways = seen.degree.map_or(String::new(), |degree| format!(", {degree} ways"));
+        let ways = seen.degree.map_or(String::new(), |degree| format!(", {}", count(degree, "way", "ways")));
         lines.push(Line::from(format!("saw {} mm{ways}", seen.radius_mm)));
     }
     if lines.is_empty() {

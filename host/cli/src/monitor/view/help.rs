@@ -6,8 +6,9 @@ use ratatui::text::{Line, Span};
 
 use super::{HERE, boxed};
 
-const KEYS: [(&str, &str); 16] = [
+const KEYS: [(&str, &str); 17] = [
     ("g", "go to a vertex of the map, and stand there"),
+    ("n", "name a vertex, or clear its name"),
     ("e", "go on exploring"),
     ("p", "pause: stand still"),
     ("c", "go on after a pause"),

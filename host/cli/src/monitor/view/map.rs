@@ -101,8 +101,15 @@ fn label(model: &Model, number: usize, radius_mm: u16) -> (Span<'static>, Vec<Te
     let radius = Span::styled(radius_mm.to_string(), FAINT);
     let permille =
         permille_at(model, number).map(|permille| Span::styled(format!("{permille}‰"), Style::new().fg(color)));
-    let both = permille.clone().map(|permille| TextLine::from(vec![radius.clone(), Span::raw(" "), permille]));
-    let details = both.into_iter().chain([TextLine::from(permille.unwrap_or(radius))]);
+    let named = model.watch().map().names.get(&(number as u8)).map(|name| Span::styled(name.clone(), style));
+    let both = permille.clone().map(|permille| vec![radius.clone(), Span::raw(" "), permille]);
+    let shortest = permille.unwrap_or(radius);
+    let details: Vec<Vec<Span<'_>>> = both.into_iter().chain([vec![shortest]]).collect();
+    let with_name = named.iter().flat_map(|name| {
+        let before = |detail: &Vec<Span<'static>>| [vec![name.clone(), Span::raw(" ")], detail.clone()].concat();
+        details.iter().map(before).chain([vec![name.clone()]]).collect::<Vec<_>>()
+    });
+    let details = with_name.chain(details.iter().cloned()).map(TextLine::from);
     (Span::styled(name, style), details.collect())
 }
 

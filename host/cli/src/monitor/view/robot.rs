@@ -13,6 +13,7 @@ use toposlam_link::event_text::{self, drive_state, seconds};
 pub(super) fn draw(frame: &mut Frame<'_>, area: Rect, model: &Model) {
     let listener = model.watch().listener();
     let picture = listener.replica();
+    let map = model.watch().map();
     let mut lines = Vec::new();
     if let Some(drive) = listener.velocity() {
         let heading_deg = (f64::from(drive.heading_mrad) / 1000.0).to_degrees();
@@ -20,7 +21,7 @@ pub(super) fn draw(frame: &mut Frame<'_>, area: Rect, model: &Model) {
         lines.push(Line::from(format!("heading {heading_deg:.0}°, {speed}‰: {}", drive_state(drive.state))));
     }
     if let Some(goal_status) = picture.goal_status() {
-        lines.push(Line::from(format!("goal vertex {}: {}", goal_status.vertex, goal_status.state)));
+        lines.push(Line::from(format!("goal vertex {}: {}", map.vertex_text(goal_status.vertex), goal_status.state)));
     }
     lines.extend(reported(model));
     lines.push(faults(model));

@@ -12,6 +12,7 @@ pub(super) fn draw(frame: &mut Frame<'_>, area: Rect, model: &Model) {
     let picture = model.watch().listener().replica();
     let here = picture.location().map(|location| usize::from(location.vertex));
     let neighbours = model.watch().map().neighbours();
+    let has_names = !model.watch().map().names.is_empty();
     let rows = model.watch().map().vertices.iter().zip(&neighbours).enumerate().skip(model.scroll());
     let rows = rows.map(|(number, (vertex, neighbours))| {
         let neighbours: Vec<String> = neighbours.iter().map(usize::to_string).collect();
@@ -24,6 +25,8 @@ pub(super) fn draw(frame: &mut Frame<'_>, area: Rect, model: &Model) {
             neighbours.join(" "),
             frontiers(model, number),
         ];
+        let name = model.watch().map().names.get(&(number as u8)).cloned();
+        let cells = cells.into_iter().chain(has_names.then(|| name.unwrap_or_default()));
         Row::new(cells).style(if is_here { HERE } else { Style::new() })
     });
     let widths = [
@@ -34,9 +37,10 @@ pub(super) fn draw(frame: &mut Frame<'_>, area: Rect, model: &Model) {
         Constraint::Min(4),
         Constraint::Length(4),
     ];
-    let table = Table::new(rows, widths)
-        .header(Row::new([" no", "mm", "seen", "‰", "edges to", "open"]).style(FAINT))
-        .block(Block::bordered().title("vertices"));
+    let widths = widths.into_iter().chain(has_names.then_some(Constraint::Max(16)));
+    let titles = [" no", "mm", "seen", "‰", "edges to", "open"].into_iter().chain(has_names.then_some("name"));
+    let table =
+        Table::new(rows, widths).header(Row::new(titles).style(FAINT)).block(Block::bordered().title("vertices"));
     frame.render_widget(table, area);
 }
 
