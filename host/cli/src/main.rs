@@ -5,6 +5,7 @@
 
 mod command;
 
+use std::io::{self, IsTerminal};
 use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
@@ -62,12 +63,27 @@ enum Task {
 }
 
 fn main() -> ExitCode {
-    match run(Arguments::parse().task) {
+    match parse().and_then(|arguments| arguments.map_or(Ok(()), |arguments| run(arguments.task))) {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) if output::is_closed(&error) => ExitCode::SUCCESS,
         Err(error) => {
             errln!("Error: {error:?}");
             error.downcast_ref::<output::ExitError>().map_or(ExitCode::FAILURE, |error| error.code.into())
+        }
+    }
+}
+
+/// The arguments; `None` if they request the help or the version, which is printed.
+fn parse() -> anyhow::Result<Option<Arguments>> {
+    match Arguments::try_parse() {
+        Ok(arguments) => Ok(Some(arguments)),
+        Err(error) if error.use_stderr() => error.exit(),
+        Err(help) => {
+            // `clap` itself ignores an output that fails.
+            let text = help.render();
+            let text = if io::stdout().is_terminal() { text.ansi().to_string() } else { text.to_string() };
+            output::write_bytes(text.as_bytes())?;
+            Ok(None)
         }
     }
 }

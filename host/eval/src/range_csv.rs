@@ -124,6 +124,11 @@ impl Ring {
         }
         let bearings = ring.bearings_deg.len();
         ensure!(bearings == ring.sonars, "{bearings} bearings for {} sonars", ring.sonars);
+        for (number, bearing_deg) in ring.bearings_deg.iter().enumerate() {
+            let apart_deg = |other: &f64| (other - bearing_deg + 180.0).rem_euclid(360.0) - 180.0;
+            let same = ring.bearings_deg[..number].iter().find(|other| apart_deg(other).abs() < 1e-6);
+            ensure!(same.is_none(), "two sonars in one direction, {bearing_deg}°");
+        }
         Ok(ring)
     }
 

@@ -3,10 +3,11 @@
 use std::{
     io::{Read, Write},
     net::TcpStream,
+    path::Path,
     time::Duration,
 };
 
-use anyhow::Context;
+use anyhow::{Context, ensure};
 
 /// Timeout of a read.
 const READ_TIMEOUT: Duration = Duration::from_millis(20);
@@ -29,6 +30,28 @@ pub fn open(name: &str, baud: u32) -> anyhow::Result<Box<dyn Line>> {
         line.set_write_timeout(Some(WRITE_TIMEOUT))?;
         return Ok(Box::new(line));
     }
+    let path = Path::new(name);
+    ensure!(!path.is_file() && !path.is_dir(), "{name} is a file or a directory, not a serial port");
+    ensure!(
+        !cfg!(unix) || path.exists(),
+        "{name}: no such file or serial port; a robot on the network is tcp:HOST:PORT"
+    );
     let port = serialport::new(name, baud).timeout(READ_TIMEOUT).open();
     Ok(Box::new(port.with_context(|| format!("opening the serial port {name}"))?))
+}
+
+#[cfg(all(test, unix))]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_name_that_is_no_line_is_refused_with_the_reason() {
+        let directory = tempfile::tempdir().unwrap();
+        let file = directory.path().join("office.bin");
+        let error = |name: &std::path::Path| format!("{:#}", open(name.to_str().unwrap(), 115_200).err().unwrap());
+        assert!(error(&file).contains("no such file or serial port"));
+        assert!(error(directory.path()).contains("not a serial port"));
+        std::fs::write(&file, "").unwrap();
+        assert!(error(&file).contains("not a serial port"));
+    }
 }

@@ -96,6 +96,14 @@ impl Ring {
                 let count = bearings_deg.len();
                 return Err(HardwareError(format!("bearings_deg has {count} bearings for {sonars} sonars")));
             }
+            for (number, degrees) in bearings_deg.iter().enumerate() {
+                let same = |other: &&f64| ((*other - degrees + 180.0).rem_euclid(360.0) - 180.0).abs() < 1e-6;
+                if let Some(other) = bearings_deg[..number].iter().find(same) {
+                    return Err(HardwareError(format!(
+                        "bearings_deg has two sonars in one direction, {other} and {degrees}"
+                    )));
+                }
+            }
             let mut radians = [0.0; SONARS_MAX];
             for (radians, degrees) in radians.iter_mut().zip(bearings_deg) {
                 *radians = check("bearings_deg", degrees, -360.0..=720.0)?.to_radians();
@@ -178,6 +186,9 @@ impl Body {
         let width_mm = number("width_mm", file.width_mm, 2.0 * body.radius_mm, 20.0..=2000.0)?;
         let track_mm =
             number("track_mm", file.track_mm, width_mm * body.track_mm / (2.0 * body.radius_mm), 10.0..=2000.0)?;
+        if track_mm > width_mm {
+            return Err(HardwareError(format!("track_mm must be at most width_mm, {width_mm}, not {track_mm}")));
+        }
         let speed_mm_per_s = number("speed_mm_per_s", file.speed_mm_per_s, model.speed_mm_per_s, 1.0..=5000.0)?;
         let frames_per_s = number("frames_per_s", file.frames_per_s, model.frames_per_s, 1.0..=100.0)?;
         let gain = track_mm / body.track_mm * model.speed_mm_per_s / speed_mm_per_s * frames_per_s / model.frames_per_s;
@@ -252,6 +263,24 @@ mod tests {
         assert!(error("sonars = 8\ncolour = 1").contains("colour"));
         assert!(error("cone_deg = 30").contains("sonars"));
         assert!(Body::parse("width_mm = -3").unwrap_err().to_string().contains("width_mm"));
+        let track = Body::parse("width_mm = 300\ntrack_mm = 301").unwrap_err().to_string();
+        assert_eq!(track, "track_mm must be at most width_mm, 300, not 301");
+        assert!(Body::parse("width_mm = 300\ntrack_mm = 300").is_ok());
+    }
+
+    #[test]
+    fn two_sonars_in_one_direction_are_refused() {
+        for bearings in ["0, 90, 180, 0", "0, 90, 180, 360", "-90, 0, 90, 270"] {
+            let error = Ring::parse(&format!("sonars = 4\nbearings_deg = [{bearings}]")).unwrap_err().to_string();
+            assert!(error.contains("two sonars in one direction"), "{error}");
+        }
+        assert!(Ring::parse("sonars = 4\nbearings_deg = [0, 1, 180, 359]").is_ok());
+    }
+
+    #[test]
+    fn a_byte_order_mark_is_no_part_of_a_file() {
+        assert_eq!(Ring::parse("\u{feff}sonars = 16").unwrap(), Ring::reference());
+        assert_eq!(Body::parse("\u{feff}").unwrap(), Body::default());
     }
 
     #[test]

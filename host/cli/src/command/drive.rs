@@ -13,6 +13,7 @@ use toposlam_cli::picture::{Drawing, draw};
 use toposlam_cli::{outln, output};
 use toposlam_eval::faults::fault_lines;
 use toposlam_eval::mapping::{has_driven_ways, is_whole, score_path};
+use toposlam_link::plural::count;
 use toposlam_sim::exploration::Exploration;
 use toposlam_sim::hardware::Hardware;
 use toposlam_sim::world::{GroundTruth, Plan, RobotModel, TrueMap};
@@ -95,11 +96,14 @@ impl DriveArguments {
     pub(super) fn summarise<const V: usize>(&self, drive: &Summary<'_, V>) -> anyhow::Result<()> {
         let Summary { plan, truth, ground_truth, map, darts, is_uncertain, path, faults, .. } = drive;
         let detections = ground_truth.detections();
-        outln!("\n{}: {} places in {} visits", self.plan(), detections.len(), ground_truth.visits())?;
+        let (places, visits) =
+            (count(detections.len(), "place", "places"), count(ground_truth.visits(), "visit", "visits"));
+        outln!("\n{}: {places} in {visits}", self.plan())?;
         outln!("{}", ground_truth.report())?;
         let (vertices, edges) = (map.vertices().len(), map.edges().count());
         let uncertain = if *is_uncertain { ", uncertain" } else { "" };
-        outln!("map: {vertices} vertices, {edges} edges, digest {:08x}{uncertain}", map_digest(map, *darts))?;
+        let (vertices, edges) = (count(vertices, "vertex", "vertices"), count(edges, "edge", "edges"));
+        outln!("map: {vertices}, {edges}, digest {:08x}{uncertain}", map_digest(map, *darts))?;
         if let Some(darts) = darts {
             outln!("frontiers: {}", darts.frontiers().count())?;
         }
@@ -108,7 +112,7 @@ impl DriveArguments {
             outln!("fault {line}")?;
         }
         let Some(file) = &self.svg else { return Ok(()) };
-        let caption = format!("{}: the map after {} places", self.plan(), detections.len());
+        let caption = format!("{}: the map after {places}", self.plan());
         let picture = draw(plan, truth, &Drawing::of_map(map, path, detections, caption));
         output::write_file(file, picture, self.force)
     }

@@ -8,6 +8,7 @@ use std::time::{Duration, Instant};
 use anyhow::{Context, ensure};
 use clap::Args;
 use toposlam_cli::fleet::cost::{allow_many_connections, computing_time, most_connections, resident_bytes};
+use toposlam_cli::fleet::maps::Maps;
 use toposlam_cli::fleet::{End, Fleet, Robot, Totals};
 use toposlam_cli::{errln, outln};
 
@@ -16,6 +17,8 @@ use super::robots::pace;
 
 /// Interval of the printed figures.
 const REPORT: Duration = Duration::from_secs(1);
+/// Interval at which the maps are merged.
+const MERGE: Duration = Duration::from_secs(10);
 /// Maximum wait for connections before the first report.
 const CONNECTING: Duration = Duration::from_secs(5);
 
@@ -34,6 +37,12 @@ pub(crate) struct Arguments {
     /// Stop after this many seconds [default: at Ctrl-C, or when no robot is connected any more].
     #[arg(long)]
     seconds: Option<u64>,
+    /// Keep one merged map per building in this directory, as building-1.json and so on, in the JSON of `export`.
+    #[arg(long, value_name = "DIRECTORY")]
+    maps: Option<PathBuf>,
+    /// Replace files of the directory.
+    #[arg(long, requires = "maps")]
+    force: bool,
     /// Speed of the recorded robots, 0.01 to 1000 times real time; 0 for as fast as they are read.
     #[arg(long, default_value_t = 1.0, value_parser = pace, requires = "simulate")]
     speed: f64,
@@ -55,6 +64,9 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
             (lines_of(&text)?, None)
         }
     };
+    let names = || lines.iter().map(|(name, _)| name.clone()).collect();
+    let maps = arguments.maps.as_deref().map(|directory| Maps::start(directory, names(), arguments.force));
+    let mut maps = maps.transpose()?;
     let interrupt = Interrupt::watch()?;
     let mut fleet = Fleet::new()?;
     let resident_before = resident_bytes();
@@ -67,7 +79,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     }
     let end = arguments.seconds.map(Duration::from_secs);
     let start = Sample::take(Instant::now(), &fleet);
-    let mut last = start;
+    let (mut last, mut merged_at) = (start, Instant::now());
     loop {
         let report_at = last.at + REPORT;
         while let Some(left) = report_at.checked_duration_since(Instant::now())
@@ -79,6 +91,12 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
         let sample = Sample::take(Instant::now(), &fleet);
         outln!("{}", sample.since(&last))?;
         last = sample;
+        if let Some(maps) = &mut maps
+            && merged_at.elapsed() >= MERGE
+        {
+            maps.update(&fleet);
+            merged_at = Instant::now();
+        }
         let is_over = end.is_some_and(|end| last.at - start.at >= end);
         if is_over || interrupt.is_told() || last.totals.connected + last.totals.connecting == 0 {
             break;
@@ -91,12 +109,23 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
             None => {}
         }
     }
+    for building in maps.map(|maps| maps.finish(&fleet)).transpose()?.into_iter().flatten() {
+        outln!("{building}")?;
+    }
     outln!("in all: {}", last.since(&start))?;
+    let totals = fleet.totals();
     let robots = fleet.robots().len().max(1) as u64;
     outln!("{} bytes of state per robot", size_of::<Robot>())?;
     if let (Some(before), Some(after)) = (resident_before, resident_bytes()) {
         outln!("{} bytes of resident memory per robot, {after} in all", after.saturating_sub(before) / robots)?;
     }
+    ensure!(
+        totals.messages > 0,
+        "no robot has sent a message: {} connecting, {} closed, {} failed",
+        totals.connecting,
+        totals.closed,
+        totals.failed
+    );
     Ok(())
 }
 

@@ -9,7 +9,7 @@ use toposlam_link::export;
 use toposlam_link::layout::Layout;
 use toposlam_link::merge::merge;
 
-use super::export::read;
+use super::export::{check_output, read};
 
 /// Arguments of `toposlam merge`.
 #[derive(Args)]
@@ -30,6 +30,7 @@ pub(crate) struct Arguments {
 }
 
 pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
+    check_output(arguments.output.as_deref(), arguments.force)?;
     let (first, here) = read(&arguments.first, arguments.baud)?;
     let (second, _) = read(&arguments.second, arguments.baud)?;
     let merged = merge(&first, &second)?;
@@ -38,6 +39,9 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     }
     let pairs: Vec<String> = merged.common.iter().map(|(a, b)| format!("{a}={b}")).collect();
     errln!("common vertices, first = second: {}", pairs.join(" "));
+    for name in second.names.values().filter(|name| !merged.map.names.values().any(|known| known == *name)) {
+        errln!("the name `{name}` of the second map is dropped: its vertex has another name in the first");
+    }
     let sizes = [&first, &second, &merged.map].map(|map| map.vertices.len());
     errln!("vertices: {} and {}, merged {}", sizes[0], sizes[1], sizes[2]);
     let mut layout = Layout::new();

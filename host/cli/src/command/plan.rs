@@ -4,12 +4,17 @@ use std::path::PathBuf;
 
 use anyhow::Context;
 use clap::Args;
+use toposlam::drive::DriveConfig;
 use toposlam::reference::VERTICES;
 use toposlam_cli::picture::{Drawing, draw};
 use toposlam_cli::{outln, output};
+use toposlam_link::plural::count;
 use toposlam_sim::world::{Limits, Plan, Point, TrueMap};
 
 use super::drive::{load_plan, start};
+
+/// The room that the drive of the reference robot keeps between its body and the walls.
+const ROOM_MM: f64 = (DriveConfig::DEFAULT.clearance_mm - DriveConfig::DEFAULT.body_radius_mm) as f64;
 
 /// Arguments of `toposlam plan`.
 #[derive(Args)]
@@ -63,8 +68,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     list(&plan, &truth)?;
     warn(&truth, &limits)?;
     let Some(file) = &arguments.svg else { return Ok(()) };
-    let mut drawing =
-        Drawing::of_truth(&truth, format!("{name}: {} places, {} edges", truth.nodes.len(), truth.edges.len()));
+    let mut drawing = Drawing::of_truth(&truth, format!("{name}: {}", size(&truth)));
     // The ways are drawn as they are.
     drawing.edges.clear();
     output::write_file(file, draw(&plan, &truth, &drawing), arguments.force)
@@ -76,12 +80,12 @@ fn list(plan: &Plan, truth: &TrueMap) -> anyhow::Result<()> {
         let (x_m, y_m) = plan.in_file_m(point);
         format!("{x_m:8.2},{y_m:.2}")
     };
-    outln!("{} places, {} edges", truth.nodes.len(), truth.edges.len())?;
+    outln!("{}", size(truth))?;
     for (index, node) in truth.nodes.iter().enumerate() {
         let hall = if node.is_hall { ", a hall" } else { "" };
         let merged = match node.meet_points.len() {
             1 => String::new(),
-            count => format!(", {count} meet points"),
+            meet_points => format!(", {meet_points} meet points"),
         };
         let (radius_mm, degree) = (node.radius_mm, node.degree);
         outln!(
@@ -103,13 +107,18 @@ fn list(plan: &Plan, truth: &TrueMap) -> anyhow::Result<()> {
         dropped.halls
     )?;
     for part in &truth.unreachable {
-        let (count, radius_mm) = (part.meet_points, part.radius_mm);
+        let meet_points = count(part.meet_points, "meet point", "meet points");
         outln!(
-            "unreachable: {count} meet points around {}, radius {radius_mm:.0} mm",
-            place(part.position).trim_start()
+            "unreachable: {meet_points} around {}, radius {:.0} mm",
+            place(part.position).trim_start(),
+            part.radius_mm
         )?;
     }
     Ok(())
+}
+
+fn size(truth: &TrueMap) -> String {
+    format!("{}, {}", count(truth.nodes.len(), "place", "places"), count(truth.edges.len(), "edge", "edges"))
 }
 
 /// Prints what the reference robot cannot cope with.
@@ -118,6 +127,12 @@ fn warn(truth: &TrueMap, limits: &Limits) -> anyhow::Result<()> {
         outln!("warning: {} places, and the map of the reference robot has room for {VERTICES}", truth.nodes.len())?;
     }
     for (index, node) in truth.nodes.iter().enumerate() {
+        let room_mm = node.radius_mm - limits.body_radius_mm;
+        if room_mm < ROOM_MM {
+            outln!(
+                "warning: place {index} leaves {room_mm:.0} mm between the body and the walls; the drive of the reference robot keeps {ROOM_MM:.0} mm"
+            )?;
+        }
         if node.is_hall {
             outln!(
                 "warning: place {index} is farther from its walls than the sonars measure ({:.0} mm)",

@@ -9,6 +9,7 @@ use anyhow::Context;
 use clap::Args;
 use toposlam_cli::outln;
 use toposlam_link::line::{Line, open};
+use toposlam_link::plural::count;
 use toposlam_link::recording::{Recorder, RecordingError, Ros2Bag, Summary};
 
 use super::export::frame_mm;
@@ -102,12 +103,12 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     }
     let summary = recorder.finish()?;
     outln!(
-        "{}: {} frames of {} bytes in {:.1} s, {} places",
+        "{}: {} frames of {} bytes in {:.1} s, {}",
         file.display(),
         summary.frames,
         summary.bytes,
         start.elapsed().as_secs_f64(),
-        summary.places
+        count(summary.places, "place", "places")
     )?;
     match lost {
         Some(error) if error.kind() != ErrorKind::UnexpectedEof => Err(error).context("the line to the robot failed"),

@@ -15,6 +15,7 @@ use toposlam_eval::laps::{Laps, Named, Shape, Tolerance, Visit};
 use toposlam_eval::mapping::Mapping;
 use toposlam_eval::range_csv::{PoseColumns, Recorded, Ring};
 use toposlam_eval::revisits::Revisits;
+use toposlam_link::plural::count;
 
 use super::filter::FilterArgument;
 #[cfg(feature = "recording")]
@@ -47,6 +48,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     let (ring, recorded) =
         load(arguments, ring).with_context(|| format!("recording {}", arguments.recording.display()))?;
     let Recorded { frames, poses, blanks } = recorded;
+    ensure!(!frames.is_empty(), "recording {}: no row of ranges", arguments.recording.display());
 
     // A smaller ring leaves slots of the frame without a sensor; they are dead in every frame.
     let mut mapping = Mapping::of_recording(&ring, arguments.filter.for_recording()?)?;
@@ -55,7 +57,8 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
             outln!("{step}")?;
         }
     }
-    outln!("\n{} frames, {} places", frames.len(), mapping.steps().len())?;
+    let (read, places) = (count(frames.len(), "frame", "frames"), count(mapping.steps().len(), "place", "places"));
+    outln!("\n{read}, {places}")?;
     for (column, blanks) in ring.columns.iter().zip(blanks).filter(|(_, blanks)| *blanks > 0) {
         outln!("sonar {column}: no range in {blanks} of {} frames; there it is a dead sonar", frames.len())?;
     }
@@ -111,9 +114,12 @@ fn load_robot_recording(_: &Path, _: Option<Ring>) -> anyhow::Result<(Ring, Reco
 fn print_map<const V: usize>(map: &Map<V>, is_uncertain: bool) -> anyhow::Result<()> {
     let edges: Vec<_> = map.edges().collect();
     let uncertain = if is_uncertain { ", uncertain" } else { "" };
-    outln!("map: {} vertices, {} edges{uncertain}", map.vertices().len(), edges.len())?;
+    let (vertices, edge_count) =
+        (count(map.vertices().len(), "vertex", "vertices"), count(edges.len(), "edge", "edges"));
+    outln!("map: {vertices}, {edge_count}{uncertain}")?;
     for (vertex, label) in map.vertices().zip(map.labels()) {
-        outln!("  vertex {vertex:2}: radius {:4} mm, {} visits", label.radius_mm(), map.visits(vertex))?;
+        let visits = count(map.visits(vertex), "visit", "visits");
+        outln!("  vertex {vertex:2}: radius {:4} mm, {visits}", label.radius_mm())?;
     }
     let texts: Vec<String> = edges.iter().map(|(a, b)| format!("{a}-{b}")).collect();
     outln!("  edges: {}", texts.join(" "))?;

@@ -3,6 +3,7 @@
 use std::fmt::Display;
 use std::path::PathBuf;
 
+use anyhow::ensure;
 use clap::Args;
 use toposlam::Filter;
 use toposlam::persist::Persist;
@@ -10,6 +11,7 @@ use toposlam::wire::FilterSettings;
 use toposlam_cli::picture::{Drawing, Step, animate};
 use toposlam_cli::progress::Progress;
 use toposlam_cli::{outln, output};
+use toposlam_link::plural::count;
 use toposlam_sim::exploration::Exploration;
 use toposlam_sim::hardware::Hardware;
 use toposlam_sim::world::{Detection, Plan, RobotModel};
@@ -19,6 +21,9 @@ use super::filter::FilterArgument;
 use super::hardware::{HardwareArguments, for_filter_and_ring};
 use super::on_graph::{self, OnGraph};
 
+/// A robot that finds no place in this many ring frames is stuck: 33 minutes, in which it drives 600 m.
+const STUCK_FRAMES: u64 = 20_000;
+
 /// Arguments of `toposlam simulate`.
 #[derive(Args)]
 pub(crate) struct Arguments {
@@ -27,7 +32,8 @@ pub(crate) struct Arguments {
     /// Stop after this many detected places.
     #[arg(long, default_value_t = 100)]
     places: usize,
-    /// Stop after this many ring frames (10 per second); 0 for no limit.
+    /// Stop after this many ring frames (10 per second); 0 for no limit. A robot that finds no place in 20000 of them is stuck, and the
+    /// command fails.
     #[arg(long, default_value_t = 1_000_000)]
     frames: u64,
     /// Write the growing map over the floor plan to an animated SVG file.
@@ -75,18 +81,30 @@ where
     let (config, body, seed) = (hardware.configured::<S, _>(filter), hardware.body.body, drive.seed());
     let mut exploration = Exploration::<V, F, S>::with_body(plan, *model, body, seed, &config, buffer)?;
     if is_reference {
-        while exploration.places() < *places && (*frames == 0 || exploration.frames() < *frames) {
-            exploration.advance();
+        let mut newest = 0;
+        while exploration.places() < *places
+            && (*frames == 0 || exploration.frames() < *frames)
+            && exploration.frames() - newest < STUCK_FRAMES
+        {
+            if exploration.advance().is_some() {
+                newest = exploration.frames();
+            }
         }
         outln!("the reference robot: {}", Summary::of(plan, &exploration).against_truth())?;
         return Ok(());
     }
     let progress = Progress::new("", *places, "places");
     let (mut way, mut steps) = (Vec::new(), Vec::new());
-    while exploration.places() < *places && (*frames == 0 || exploration.frames() < *frames) {
+    let mut newest = exploration.frames();
+    let is_stuck = |exploration: &Exploration<'_, V, F, S>, newest| exploration.frames() - newest >= STUCK_FRAMES;
+    while exploration.places() < *places
+        && (*frames == 0 || exploration.frames() < *frames)
+        && !is_stuck(&exploration, newest)
+    {
         if exploration.advance().is_some()
             && let Some(step) = exploration.steps().last()
         {
+            newest = exploration.frames();
             progress.println(step)?;
             progress.increment();
             if animation.is_some() {
@@ -104,6 +122,14 @@ where
         output::write_file(file, picture, arguments.drive.force())?;
     }
     outln!("{} ring frames, stopped by a wall in {}", exploration.frames(), exploration.rover().bumps())?;
+    ensure!(
+        !is_stuck(&exploration, newest),
+        "the robot is stuck at {:.2},{:.2}: {} of {places} places, and none in the last {STUCK_FRAMES} ring frames; `toposlam plan` lists what a \
+         robot can reach and where it has little room",
+        plan.in_file_m(exploration.rover().position()).0,
+        plan.in_file_m(exploration.rover().position()).1,
+        exploration.places()
+    );
     Ok(())
 }
 
@@ -126,7 +152,7 @@ where
             Detection { position: node.map_or(detection.position, |node| node.position), ..*detection }
         })
         .collect();
-    let caption = format!("{plan}: the map after {} places", detections.len());
+    let caption = format!("{plan}: the map after {}", count(detections.len(), "place", "places"));
     let map = exploration.robot().mapper().map();
     Step { drawing: Drawing::of_map(map, &exploration.path(), &detections, caption), driven }
 }

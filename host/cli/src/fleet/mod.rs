@@ -3,6 +3,7 @@
 //! | Module | Purpose |
 //! |---|---|
 //! | [`Fleet`] | the monitoring side: a [`Listener`] for each robot, fed when its line is readable |
+//! | [`maps`] | one merged map per building |
 //! | [`replay_server`] | the robots' side, for tests and measurements: recorded robots that repeat their streams |
 //! | [`cost`] | the resources that this process uses |
 //!
@@ -24,6 +25,7 @@
 //! ```
 
 pub mod cost;
+pub mod maps;
 pub mod replay_server;
 
 use std::io::{self, ErrorKind, Read};

@@ -8,6 +8,7 @@ use anyhow::{Context, ensure};
 use serde_json::{Value, json};
 
 use toposlam_link::link::{Link, LinkEvent, Options, Source};
+use toposlam_link::listener::Understanding;
 use toposlam_link::{event_text, json};
 
 /// Maximum number of queued events; then the link waits.
@@ -48,7 +49,7 @@ pub fn run(
     let (sender, inbox) = sync_channel(QUEUE);
     let _link = Link::start(Source::named(name, baud), options, move |event| sender.send(event).is_ok());
     let deadline = limits.time.and_then(|time| Instant::now().checked_add(time));
-    let mut events = 0;
+    let (mut events, mut knows_several) = (0, false);
     while limits.events.is_none_or(|most| events < most) {
         let patience = deadline.map_or(Duration::MAX, |deadline| deadline.saturating_duration_since(Instant::now()));
         let event = match inbox.recv_timeout(patience) {
@@ -57,8 +58,14 @@ pub fn run(
             Err(RecvTimeoutError::Disconnected) => break,
         };
         events += u64::from(matches!(event, LinkEvent::Received(..)));
+        let is_several = several(&event);
         let is_over = matches!(event, LinkEvent::Ended);
-        if let Err(error) = write_line(&event, name, form, &mut out) {
+        let mut written = write_line(&event, name, form, &mut out);
+        if is_several && !knows_several {
+            written = written.and_then(|()| warn_of_several(name, form, &mut out));
+        }
+        knows_several = is_several;
+        if let Err(error) = written {
             // The reader has closed the output.
             return if error.kind() == io::ErrorKind::BrokenPipe { Ok(()) } else { Err(error).context("writing") };
         }
@@ -69,6 +76,20 @@ pub fn run(
     let wanted = limits.events.unwrap_or(1);
     ensure!(events >= wanted, "{events} of {wanted} events came in time");
     Ok(())
+}
+
+/// Whether the frames of several robots alternate on the line.
+fn several(event: &LinkEvent) -> bool {
+    matches!(event, LinkEvent::Received(_, listener) if listener.understanding() == Understanding::Several)
+}
+
+fn warn_of_several(name: &str, form: Form, out: &mut impl Write) -> io::Result<()> {
+    let text = Understanding::Several;
+    match form {
+        Form::Words => writeln!(out, "warning: {text}")?,
+        Form::Json => writeln!(out, "{}", json!({"event": "Several", "line": name, "text": text.to_string()}))?,
+    }
+    out.flush()
 }
 
 fn write_line(event: &LinkEvent, name: &str, form: Form, out: &mut impl Write) -> io::Result<()> {

@@ -80,5 +80,6 @@ impl Point {
 
 /// The length of a polyline, in millimetres.
 pub fn length_mm(way: &[Point]) -> f64 {
-    way.windows(2).map(|ends| ends[0].distance_mm(ends[1])).sum()
+    // The sum of no numbers is −0.
+    way.windows(2).map(|ends| ends[0].distance_mm(ends[1])).sum::<f64>() + 0.0
 }

@@ -19,6 +19,7 @@ use ratatui::widgets::{Block, Paragraph, Wrap};
 
 use super::model::{Model, Pane};
 use toposlam_link::listener::Understanding;
+use toposlam_link::plural::count;
 use toposlam_link::watch::Connection;
 
 /// Silence of a robot after which a warning is shown; it normally sends several messages per second.
@@ -110,7 +111,7 @@ fn heading(model: &Model) -> Line<'_> {
         if exploration.complete { ", complete".to_owned() } else { format!(", {} open", exploration.frontiers) }
     });
     let (vertices, edges) = (map.vertices.len(), map.all_edges().len());
-    let size = format!(" {}, {}{explored} ", many(vertices, "vertex", "vertices"), many(edges, "edge", "edges"));
+    let size = format!(" {}, {}{explored} ", count(vertices, "vertex", "vertices"), count(edges, "edge", "edges"));
     let name = if model.is_read_only() { "standard input" } else { model.watch().line() };
     Line::from(vec![Span::from(format!("{name} ")), connection, Span::from(size), whole])
 }
@@ -174,8 +175,4 @@ fn log(frame: &mut Frame<'_>, area: Rect, model: &Model) {
 fn boxed(frame: &mut Frame<'_>, area: Rect, title: &str, lines: Vec<Line<'_>>) {
     let block = Block::bordered().title(title);
     frame.render_widget(Paragraph::new(lines).wrap(Wrap { trim: true }).block(block), area);
-}
-
-fn many(count: usize, one: &str, several: &str) -> String {
-    format!("{count} {}", if count == 1 { one } else { several })
 }

@@ -123,8 +123,5 @@ impl fmt::Display for PlanFileError {
     }
 }
 
-impl std::error::Error for PlanFileError {
-    fn source(&self) -> Option<&(dyn std::error::Error + 'static)> {
-        Some(&self.error)
-    }
-}
+/// The text names the error: there is no source that repeats it.
+impl std::error::Error for PlanFileError {}

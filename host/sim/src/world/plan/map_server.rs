@@ -42,6 +42,7 @@ pub(super) fn load(file: &Path) -> Result<Drawn, PlanFileError> {
 impl Settings {
     /// Reads `key: value` lines; keys that say nothing about walls are passed over.
     fn parse(text: &str) -> Result<Self, PlanError> {
+        let text = text.trim_start_matches('\u{feff}');
         const RESOLUTION: &str = "a number of metres from 0.01 to 1";
         const IMAGE: &str = "the name of a PNG or PGM file";
         const THRESHOLD: &str = "a number from 0 to 1";

@@ -121,8 +121,8 @@ impl Plan {
     /// # Errors
     /// What is wrong with the text, and where.
     pub fn parse(text: &str) -> Result<Self, PlanError> {
-        let is_svg = text.trim_start_matches('\u{feff}').trim_start().starts_with('<');
-        if is_svg { svg::parse(text) } else { text::parse(text) }.map(Self::from)
+        let text = text.trim_start_matches('\u{feff}');
+        if text.trim_start().starts_with('<') { svg::parse(text) } else { text::parse(text) }.map(Self::from)
     }
 
     /// The same plan with another start: metres in the frame of the file, whose origin is the lower left corner of a text plan and
