@@ -1,7 +1,7 @@
 //! Components of the `toposlam` command: the emulated robot, the views of a robot on a line, and drawings.
 //!
 //! [`emulator`] runs the firmware in a simulated building. [`monitor`] shows a robot in a terminal, [`serve`] in
-//! browsers, and `publish` (feature `mqtt`) publishes it to an MQTT broker; [`fleet`] monitors a thousand robots at
+//! browsers, and `publish` (features `mqtt` and `zenoh`) publishes it to a broker; [`fleet`] monitors a thousand robots at
 //! once. [`output`] is the standard output of all commands. [`picture`] draws a map over its floor plan, and [`progress`] a
 //! progress bar.
 
@@ -14,7 +14,7 @@ pub mod monitor;
 pub mod output;
 pub mod picture;
 pub mod progress;
-#[cfg(feature = "mqtt")]
+#[cfg(any(feature = "mqtt", feature = "zenoh"))]
 pub mod publish;
 pub mod serve;
 

@@ -54,7 +54,7 @@ enum Task {
     /// Serve many recorded robots at one TCP port.
     #[command(hide = true)]
     Robots(command::robots::Arguments),
-    /// Publish a robot's messages and map to an MQTT broker (feature `mqtt`).
+    /// Publish a robot's messages and map to an MQTT broker or a Zenoh router (features `mqtt`, `zenoh`).
     Publish(command::publish::Arguments),
     /// Serve a web page with a robot's live map.
     Serve(command::serve::Arguments),

@@ -286,13 +286,13 @@ fn export_writes_the_map_of_a_stream_and_reports_its_gaps() {
     assert!(complaint(&toposlam(&["export", name, "--format", "geojson", "--edge-m", "0"])).contains("0.1 to 1000"));
 }
 
-#[cfg(not(all(feature = "mqtt", feature = "recording")))]
+#[cfg(not(all(any(feature = "mqtt", feature = "zenoh"), feature = "recording")))]
 #[test]
 fn a_command_omitted_from_the_build_names_its_feature() {
     for (command, feature, is_built) in [
         ("record", "recording", cfg!(feature = "recording")),
         ("play", "recording", cfg!(feature = "recording")),
-        ("publish", "mqtt", cfg!(feature = "mqtt")),
+        ("publish", "mqtt", cfg!(any(feature = "mqtt", feature = "zenoh"))),
     ] {
         if !is_built {
             let text = complaint(&toposlam(&[command, "tcp:127.0.0.1:7070", "--seconds", "3"]));

@@ -27,7 +27,7 @@ macro_rules! missing {
 
 #[cfg(not(feature = "recording"))]
 missing!(play, "recording");
-#[cfg(not(feature = "mqtt"))]
+#[cfg(not(any(feature = "mqtt", feature = "zenoh")))]
 missing!(publish, "mqtt");
 #[cfg(not(feature = "recording"))]
 missing!(record, "recording");

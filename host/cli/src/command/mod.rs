@@ -17,14 +17,14 @@ mod hardware;
 mod interrupt;
 mod machine;
 pub(crate) mod merge;
-#[cfg(not(all(feature = "mqtt", feature = "recording")))]
+#[cfg(not(all(any(feature = "mqtt", feature = "zenoh"), feature = "recording")))]
 mod missing;
 pub(crate) mod monitor;
 mod on_graph;
 pub(crate) mod plan;
 #[cfg(feature = "recording")]
 pub(crate) mod play;
-#[cfg(feature = "mqtt")]
+#[cfg(any(feature = "mqtt", feature = "zenoh"))]
 pub(crate) mod publish;
 mod received;
 #[cfg(feature = "recording")]
@@ -38,7 +38,7 @@ pub(crate) mod serve;
 pub(crate) mod simulate;
 pub(crate) mod soak;
 
-#[cfg(not(feature = "mqtt"))]
+#[cfg(not(any(feature = "mqtt", feature = "zenoh")))]
 pub(crate) use missing::publish;
 #[cfg(not(feature = "recording"))]
 pub(crate) use missing::{play, record};

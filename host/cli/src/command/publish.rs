@@ -1,4 +1,4 @@
-//! `toposlam publish`: publish a robot's messages to an MQTT broker.
+//! `toposlam publish`: publish a robot's messages to an MQTT broker or through a Zenoh router.
 
 use std::sync::mpsc::channel;
 use std::sync::{Arc, Mutex, PoisonError};
@@ -19,7 +19,7 @@ const TURN: Duration = Duration::from_millis(50);
 pub(crate) struct Arguments {
     /// Serial port of the robot, tcp:HOST:PORT, or - for the bytes of its line on the standard input.
     line: String,
-    /// Broker: mqtt://HOST:PORT, or mqtt://USER:PASSWORD@HOST:PORT.
+    /// Broker: mqtt://HOST:PORT, mqtt://USER:PASSWORD@HOST:PORT, or zenoh://HOST:PORT for a Zenoh router.
     #[arg(long)]
     broker: Broker,
     /// Name of the robot in the topics toposlam/NAME/events, map and status.

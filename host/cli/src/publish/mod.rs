@@ -1,4 +1,5 @@
-//! Publishes a robot's messages to an MQTT broker (feature `mqtt`). Subscribers cannot send commands.
+//! Publishes a robot's messages to an MQTT broker (feature `mqtt`) or through a Zenoh router (feature `zenoh`). Subscribers cannot send
+//! commands.
 //!
 //! | Topic | Holds | Retained | QoS |
 //! |---|---|---|---|
@@ -7,6 +8,9 @@
 //! | `toposlam/NAME/events` | each message and decoding error as [`json::event`] | no | 0 |
 //! | `toposlam/NAME/frames` | each message as the frame it came in, if [`Options::frames`] is set | no | 0 |
 //!
+//! Zenoh has no retained messages and no last will. There the publisher answers queries for status and map, and holds a liveliness token
+//! with the key of the status.
+//!
 //! The broker never delays the robot's line: messages that exceed a bounded queue, or arrive while the broker is
 //! disconnected, are dropped and counted. Status and map are published again after a reconnection.
 //!
@@ -14,26 +18,30 @@
 //! use toposlam_cli::publish::{Broker, Options, Publisher};
 //!
 //! let broker: Broker = "mqtt://127.0.0.1:1".parse()?;
-//! // No broker listens there; the publisher keeps trying.
-//! let publisher = Publisher::start(Options::new(broker, "kitchen")?, |_| ());
-//! assert_eq!(publisher.counters().published, 0);
+//! if let Ok(options) = Options::new(broker, "kitchen") {
+//!     // No broker listens there; the publisher keeps trying.
+//!     let publisher = Publisher::start(options, |_| ());
+//!     assert_eq!(publisher.counters().published, 0);
+//! }
 //! assert!("http://127.0.0.1".parse::<Broker>().is_err());
 //! # Ok::<(), toposlam_cli::publish::OptionError>(())
 //! ```
 
 mod broker;
+#[cfg(feature = "mqtt")]
+mod mqtt;
+#[cfg(feature = "zenoh")]
+mod zenoh;
 
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
-use std::sync::mpsc::{Receiver, channel};
+use std::sync::mpsc::Receiver;
 use std::sync::{Arc, Mutex, PoisonError};
-use std::thread;
 use std::time::Duration;
 
-use rumqttc::{Client, ConnectionError, LastWill, MqttOptions, Packet, QoS};
 use serde_json::{Value, json};
 use toposlam::wire::{Encoder, MAX_FRAME_BYTES, Message};
 
-pub use broker::{Broker, OptionError, Options};
+pub use broker::{Broker, OptionError, Options, Protocol};
 
 use toposlam_link::json;
 use toposlam_link::link::LinkEvent;
@@ -41,14 +49,10 @@ use toposlam_link::listener::{Event, Listener};
 
 /// Maximum number of queued messages.
 const QUEUE_MESSAGES: usize = 256;
-/// MQTT keep-alive interval.
-const KEEP_ALIVE: Duration = Duration::from_secs(5);
 /// Delay before the next attempt to connect.
 const RETRY: Duration = Duration::from_millis(500);
 /// Timeout of the disconnection.
 const FAREWELL: Duration = Duration::from_secs(1);
-/// Maximum packet size; larger than any map as JSON.
-const MOST_BYTES: usize = 1 << 17;
 
 /// An event of the connection to the broker.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -70,10 +74,18 @@ pub struct Counters {
 
 /// Publishes a robot's messages to a broker. Dropping it sets the robot's status to `offline`.
 pub struct Publisher {
-    client: Client,
+    outlet: Box<dyn Outlet>,
     shared: Arc<Shared>,
     frames: bool,
     ended: Receiver<()>,
+}
+
+/// The bounded queue of a connection to a broker. Both methods return at once, `false` if the queue is full.
+trait Outlet: Send {
+    /// Queues a message. A retained one is delivered to later subscribers, too.
+    fn queue(&self, topic: &str, payload: Vec<u8>, is_retained: bool) -> bool;
+    /// Ends the connection after the queued messages.
+    fn end(&self) -> bool;
 }
 
 /// State shared by the publisher and the broker's thread.
@@ -111,19 +123,6 @@ impl Publisher {
         let topic = |what| format!("toposlam/{}/{what}", options.robot);
         let topics =
             Topics { status: topic("status"), map: topic("map"), events: topic("events"), frames: topic("frames") };
-        let Broker { host, port, login } = options.broker;
-        // The client id is the robot's, so that a new publisher replaces one that hangs.
-        let mut mqtt = MqttOptions::new(format!("toposlam-{}", options.robot), host, port);
-        mqtt.set_keep_alive(KEEP_ALIVE).set_max_packet_size(MOST_BYTES, MOST_BYTES).set_last_will(LastWill::new(
-            &topics.status,
-            OFFLINE,
-            QoS::AtLeastOnce,
-            true,
-        ));
-        if let Some((user, password)) = login {
-            mqtt.set_credentials(user, password);
-        }
-        let (client, connection) = Client::new(mqtt, QUEUE_MESSAGES);
         let shared = Arc::new(Shared {
             topics,
             retained: Mutex::new(Retained { status: OFFLINE, status_due: true, map: None, map_due: false }),
@@ -132,14 +131,16 @@ impl Publisher {
             published: AtomicU64::new(0),
             dropped: AtomicU64::new(0),
         });
-        let (sender, ended) = channel();
-        let far = (client.clone(), Arc::clone(&shared));
-        thread::spawn(move || {
-            serve(connection, &far.0, &far.1, on_event);
-            // The receiver may already be gone.
-            let _ = sender.send(());
-        });
-        Self { client, shared, frames: options.frames, ended }
+        let frames = options.frames;
+        let (outlet, ended): (Box<dyn Outlet>, _) = match options.broker.protocol {
+            #[cfg(feature = "mqtt")]
+            Protocol::Mqtt => mqtt::start(options, Arc::clone(&shared), on_event),
+            #[cfg(feature = "zenoh")]
+            Protocol::Zenoh => zenoh::start(options, Arc::clone(&shared), on_event),
+            #[allow(unreachable_patterns)]
+            _ => unreachable!("options are refused if their protocol is not built"),
+        };
+        Self { outlet, shared, frames, ended }
     }
 
     /// Processes an event of the robot's link. Never blocks.
@@ -153,17 +154,17 @@ impl Publisher {
                 if changes_map(event) && listener.replica().is_converged() {
                     retained.set_map(map_json(listener).to_string());
                 }
-                self.shared.offer(&self.client, &self.shared.topics.events, json::event(event).to_string());
+                self.shared.offer(&*self.outlet, &self.shared.topics.events, json::event(event).to_string());
                 if let (true, Event::Message(header, message)) = (self.frames, event) {
                     let mut buffer = [0; MAX_FRAME_BYTES];
                     // A buffer of this size is always sufficient.
                     let frame = Encoder::new(header.sequence).encode(message, &mut buffer).unwrap_or(&[]);
-                    self.shared.offer(&self.client, &self.shared.topics.frames, frame);
+                    self.shared.offer(&*self.outlet, &self.shared.topics.frames, frame);
                 }
             }
             LinkEvent::TaskDone(..) => {}
         }
-        self.shared.settle(&self.client, &mut retained);
+        self.shared.settle(&*self.outlet, &mut retained);
     }
 
     /// The counts so far.
@@ -179,11 +180,11 @@ impl Drop for Publisher {
     fn drop(&mut self) {
         let mut retained = self.shared.retained();
         retained.set_status(OFFLINE);
-        self.shared.settle(&self.client, &mut retained);
+        self.shared.settle(&*self.outlet, &mut retained);
         drop(retained);
         self.shared.is_ending.store(true, Ordering::Relaxed);
         // If the queue is full, the broker publishes the last will instead.
-        if self.client.try_disconnect().is_ok() && self.shared.is_connected() {
+        if self.outlet.end() && self.shared.is_connected() {
             let _ = self.ended.recv_timeout(FAREWELL);
         }
     }
@@ -209,24 +210,40 @@ impl Shared {
         self.retained.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
+    /// The broker accepted the connection. A new or restarted broker has no retained messages.
+    fn connected(&self, outlet: &dyn Outlet) {
+        let mut retained = self.retained();
+        (retained.status_due, retained.map_due) = (true, true);
+        self.is_connected.store(true, Ordering::Relaxed);
+        self.settle(outlet, &mut retained);
+    }
+
+    fn disconnected(&self) {
+        self.is_connected.store(false, Ordering::Relaxed);
+    }
+
+    fn is_ending(&self) -> bool {
+        self.is_ending.load(Ordering::Relaxed)
+    }
+
     fn is_connected(&self) -> bool {
         self.is_connected.load(Ordering::Relaxed)
     }
 
     /// Queues a message that may be dropped.
-    fn offer(&self, client: &Client, topic: &str, payload: impl Into<Vec<u8>>) {
-        let is_queued = self.is_connected() && client.try_publish(topic, QoS::AtMostOnce, false, payload).is_ok();
+    fn offer(&self, outlet: &dyn Outlet, topic: &str, payload: impl Into<Vec<u8>>) {
+        let is_queued = self.is_connected() && outlet.queue(topic, payload.into(), false);
         let count = if is_queued { &self.published } else { &self.dropped };
         count.fetch_add(1, Ordering::Relaxed);
     }
 
     /// Queues retained messages that the broker does not have yet. If the queue is full, the next event retries.
-    fn settle(&self, client: &Client, retained: &mut Retained) {
+    fn settle(&self, outlet: &dyn Outlet, retained: &mut Retained) {
         if !self.is_connected() {
             return;
         }
         let queue = |topic: &str, payload: &str| {
-            let is_queued = client.try_publish(topic, QoS::AtLeastOnce, true, payload).is_ok();
+            let is_queued = outlet.queue(topic, payload.into(), true);
             self.published.fetch_add(u64::from(is_queued), Ordering::Relaxed);
             !is_queued
         };
@@ -237,39 +254,26 @@ impl Shared {
     }
 }
 
-/// Maintains the connection to the broker until the publisher ends.
-fn serve(
-    mut connection: rumqttc::Connection,
-    client: &Client,
-    shared: &Shared,
-    mut on_event: impl FnMut(BrokerEvent) + Send,
-) {
-    let mut last_reason = String::new();
-    for event in connection.iter() {
-        match event {
-            Ok(rumqttc::Event::Incoming(Packet::ConnAck(_))) => {
-                let mut retained = shared.retained();
-                // A new or restarted broker has no retained messages.
-                (retained.status_due, retained.map_due) = (true, true);
-                shared.is_connected.store(true, Ordering::Relaxed);
-                shared.settle(client, &mut retained);
-                drop(retained);
-                last_reason.clear();
-                on_event(BrokerEvent::Connected);
-            }
-            Ok(_) => {}
-            Err(error) => {
-                shared.is_connected.store(false, Ordering::Relaxed);
-                if shared.is_ending.load(Ordering::Relaxed) || matches!(error, ConnectionError::RequestsDone) {
-                    return;
-                }
-                let reason = error.to_string();
-                if reason != last_reason {
-                    on_event(BrokerEvent::Disconnected(reason.clone()));
-                    last_reason = reason;
-                }
-                thread::sleep(RETRY);
-            }
+/// Reports the state of a connection, a repeated failure for the same reason once.
+struct Reports<F> {
+    on_event: F,
+    last_reason: String,
+}
+
+impl<F: FnMut(BrokerEvent)> Reports<F> {
+    fn new(on_event: F) -> Self {
+        Self { on_event, last_reason: String::new() }
+    }
+
+    fn connected(&mut self) {
+        self.last_reason.clear();
+        (self.on_event)(BrokerEvent::Connected);
+    }
+
+    fn disconnected(&mut self, reason: String) {
+        if reason != self.last_reason {
+            (self.on_event)(BrokerEvent::Disconnected(reason.clone()));
+            self.last_reason = reason;
         }
     }
 }

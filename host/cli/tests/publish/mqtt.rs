@@ -1,39 +1,22 @@
-//! `publish` with a real broker, mosquitto: what a subscriber receives, and the behaviour when robot or broker is gone.
-#![cfg(feature = "mqtt")]
+//! `publish` with a real broker, mosquitto.
 
 use std::io::Write;
 use std::net::{TcpListener, TcpStream};
 use std::path::Path;
-use std::process::{Child, Command, Stdio};
+use std::process::{Command, Stdio};
 use std::sync::mpsc::channel;
 use std::thread;
-use std::time::{Duration, Instant};
+use std::time::Instant;
 
 use rumqttc::{Client, Connection, Event, MqttOptions, Packet, Publish, QoS};
 use serde_json::Value;
 use toposlam::reference::SNAPSHOT_BYTES;
 use toposlam_cli::publish::{BrokerEvent, Options, Publisher};
-use toposlam_link::broadcast::Broadcast;
 use toposlam_link::link::LinkEvent;
 use toposlam_link::listener::Listener;
 use toposlam_link::topology::TopologicalMap;
-use toposlam_sim::exploration::Exploration;
-use toposlam_sim::world::{Plan, RobotModel};
 
-/// Timeout of every wait in these tests.
-const DEADLINE: Duration = Duration::from_secs(60);
-const SHORT: Duration = Duration::from_millis(2);
-const PLACES: usize = 12;
-
-/// A process that is killed at the end of the test.
-struct Process(Child);
-
-impl Drop for Process {
-    fn drop(&mut self) {
-        let _ = self.0.kill();
-        let _ = self.0.wait();
-    }
-}
+use super::{DEADLINE, Process, SHORT, explored, free_port, is_map, map, robot};
 
 /// The path of the broker on Debian, which is not in every user's `PATH`.
 fn mosquitto() -> Option<&'static str> {
@@ -45,10 +28,6 @@ fn mosquitto() -> Option<&'static str> {
         eprintln!("SKIPPED: mosquitto is missing: apt-get install mosquitto");
     }
     found
-}
-
-fn free_port() -> u16 {
-    TcpListener::bind("127.0.0.1:0").unwrap().local_addr().unwrap().port()
 }
 
 fn start_broker(program: &str, directory: &Path, port: u16) -> Process {
@@ -95,68 +74,12 @@ impl Subscriber {
     }
 
     fn wait_for_map(&mut self, map: &TopologicalMap) -> Publish {
-        self.wait_for(|message| message.topic == "toposlam/kitchen/map" && is_map(message, map))
+        self.wait_for(|message| message.topic == "toposlam/kitchen/map" && is_map(&message.payload, map))
     }
 
     fn wait_for_status(&mut self, status: &str) -> Publish {
         self.wait_for(|message| message.topic == "toposlam/kitchen/status" && message.payload == status.as_bytes())
     }
-}
-
-/// Whether a message contains exactly this map.
-fn is_map(message: &Publish, map: &TopologicalMap) -> bool {
-    let json: Value = serde_json::from_slice(&message.payload).unwrap();
-    let number = |value: &Value| value.as_u64().unwrap();
-    let labels = json["vertices"].as_array().unwrap().iter().enumerate().map(|(index, vertex)| {
-        assert_eq!(number(&vertex["vertex"]), index as u64);
-        (number(&vertex["radius_mm"]), number(&vertex["visits"]))
-    });
-    let edges = json["edges"].as_array().unwrap().iter().map(|edge| (number(&edge[0]), number(&edge[1])));
-    labels.eq(map.vertices.iter().map(|vertex| (vertex.radius_mm.into(), vertex.visits.into())))
-        && edges.eq(map.edges.iter().map(|&(a, b)| (a.into(), b.into())))
-        && number(&json["digest"]) == u64::from(map.digest())
-}
-
-/// A robot that explores once a client is connected, and then only repeats its state.
-fn robot() -> String {
-    let mut broadcast = Broadcast::bind("127.0.0.1:0").unwrap();
-    let line = format!("tcp:{}", broadcast.address().unwrap());
-    thread::spawn(move || {
-        let mut say = |said: &[u8]| {
-            broadcast.exchange(said);
-            thread::sleep(SHORT);
-            broadcast.listeners()
-        };
-        while say(&[]) == 0 {}
-        let mut buffer = [0; SNAPSHOT_BYTES];
-        let mut exploration = explored(&mut buffer, |said| {
-            say(said);
-        });
-        exploration.command(toposlam::wire::Command::Pause { on: true });
-        loop {
-            exploration.advance();
-            say(&exploration.board().sent);
-        }
-    });
-    line
-}
-
-/// Runs a deterministic exploration until the robot has sent its whole map.
-fn explored(buffer: &mut [u8], mut say: impl FnMut(&[u8])) -> Exploration<'_> {
-    let plan = Plan::built_in("flat").unwrap();
-    let mut exploration = Exploration::start(&plan, RobotModel::default(), 1, buffer).unwrap();
-    let mut listener = Listener::new();
-    while exploration.places() < PLACES || !listener.replica().is_converged() || listener.map() != map(&exploration) {
-        exploration.advance();
-        let said = &exploration.board().sent;
-        listener.feed(said, |_, _| ());
-        say(said);
-    }
-    exploration
-}
-
-fn map(exploration: &Exploration<'_>) -> TopologicalMap {
-    TopologicalMap::of(exploration.robot().mapper().filter())
 }
 
 #[test]
@@ -185,7 +108,7 @@ fn a_late_subscriber_gets_the_map_and_the_last_will() {
             }
             _ => {}
         }
-        has_map |= message.topic == "toposlam/kitchen/map" && is_map(message, &map);
+        has_map |= message.topic == "toposlam/kitchen/map" && is_map(&message.payload, &map);
         has_map && places > 0 && listener.replica().is_converged() && listener.map() == map
     });
     assert!(map.vertices.len() > 2 && !map.edges.is_empty());
