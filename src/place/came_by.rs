@@ -40,7 +40,7 @@ impl CameBy {
         self.frames = 0;
     }
 
-    /// Follows the way by which the robot came. Along an edge it is straight behind. From the first sighting of a meet point it is
+    /// Follows the way by which the robot came. Along an edge it is straight behind. Near a meet point it is
     /// the opening near the bearing to which the rotation of the ring brings it, because the errors of the rotation add up, or that
     /// bearing where the sonars show no opening, as in front of a door.
     pub(super) fn track<const SONARS: usize>(

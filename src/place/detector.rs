@@ -214,7 +214,10 @@ impl<const SONARS: usize> PlaceDetector<SONARS> {
         self.measured = measured;
         self.rotation.update(&self.smooth_mm, &self.geometry);
         self.turned_mrad = rotated(self.turned_mrad, self.rotation.rotation_mrad());
-        let is_on_edge = !self.is_at_place && self.sightings == 0;
+        // Near a meet point the robot may turn towards it: the way by which it came is then not straight behind.
+        let nearest_mm = (self.config.leave_mm / 2).saturating_mul(3);
+        let is_far = measured.spread_mm().is_none_or(|spread_mm| spread_mm > nearest_mm);
+        let is_on_edge = !self.is_at_place && self.sightings == 0 && is_far;
         let mut came_by = self.came_by;
         came_by.track(&self.scan(), &measured, self.rotation.rotation_mrad(), is_on_edge);
         self.came_by = came_by;
