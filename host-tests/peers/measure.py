@@ -19,8 +19,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from observations import Ways
+
 PEERS = {"hmmlearn": "peer_hmmlearn", "alergia": "peer_alergia", "chmm": "peer_cloned_hmm"}
 """The module of every peer. Each has `find_path(radii_mm, seed)`, which returns a state for every radius."""
+
+TOLD_WAYS = {"chmm-actions": "peer_action_chmm"}
+"""The module of every peer that is told the ways as well: `find_path(radii_mm, seed, ways)`."""
 
 ONE_THREAD = {name: "1" for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")}
 
@@ -39,9 +44,16 @@ class Measurement:
     """How much larger that is than before the first path."""
 
 
-def measure(peer: str, radii_mm: Sequence[Sequence[float]], seeds: Sequence[int]) -> Measurement:
-    """Runs a peer on several paths, one after the other, each with its own seed."""
+def measure(
+    peer: str,
+    radii_mm: Sequence[Sequence[float]],
+    seeds: Sequence[int],
+    ways: Sequence[Sequence[Ways]] | None = None,
+) -> Measurement:
+    """Runs a peer on several paths, one after the other, each with its own seed. `ways` are for a peer that is told them."""
     request = {"peer": peer, "radii_mm": [list(path) for path in radii_mm], "seeds": list(seeds)}
+    if ways is not None:
+        request["ways"] = [[(place.others_mrad, place.exit_mrad) for place in path] for path in ways]
     done = subprocess.run(
         [sys.executable, __file__],
         input=json.dumps(request),
@@ -72,12 +84,15 @@ def _peak_mebibytes() -> float:
 
 
 def _answer(request: dict) -> dict:
-    peer = importlib.import_module(PEERS[request["peer"]])
+    peer = importlib.import_module((PEERS | TOLD_WAYS)[request["peer"]])
     before = _peak_mebibytes()
     paths, seconds = [], []
-    for radii_mm, seed in zip(request["radii_mm"], request["seeds"], strict=True):
+    told = [
+        [[Ways(tuple(others_mrad), exit_mrad) for others_mrad, exit_mrad in path]] for path in request.get("ways", [])
+    ] or [[] for _ in request["seeds"]]
+    for radii_mm, seed, ways in zip(request["radii_mm"], request["seeds"], told, strict=True):
         start = time.process_time()
-        paths.append(peer.find_path(radii_mm, seed))
+        paths.append(peer.find_path(radii_mm, seed, *ways))
         seconds.append(time.process_time() - start)
     peak = _peak_mebibytes()
     return {"paths": paths, "seconds": seconds, "peak_mebibytes": peak, "working_mebibytes": peak - before}

@@ -1,6 +1,7 @@
 """Reads what `toposlam evaluate --export DIR` writes: rows of paths, each with its observations and its truth.
 
-A peer is handed `radii_mm` and nothing else: the hints of the CSV (`turn`, `degree`) and the true place are not read.
+A peer is handed `radii_mm` and nothing else, except one that is told the ways as well. The other hints of the CSV (`turn`,
+`degree`) and the true place are not read.
 """
 
 from __future__ import annotations
@@ -54,6 +55,29 @@ def read_radii_mm(path_file: Path, length: int) -> list[float]:
     if len(radii_mm) < length:
         raise ValueError(f"{path_file} has {len(radii_mm)} places, not {length}")
     return radii_mm[:length]
+
+
+@dataclass(frozen=True)
+class Ways:
+    """What a robot with a ring perceives of the ways of a place."""
+
+    others_mrad: tuple[float, ...]
+    """The bearings of the ways seen, relative to the one by which the robot came, which is not among them."""
+    exit_mrad: float | None
+    """The exit that it took at the place before, 0 for back; `None` if it was not reported."""
+
+
+def read_ways(path_file: Path, length: int) -> list[Ways]:
+    """The ways of the first `length` places."""
+    with path_file.open(newline="") as lines:
+        rows = list(csv.DictReader(lines))[:length]
+    return [
+        Ways(
+            tuple(float(bearing) for bearing in (row["ways_mrad"] or "").split()),
+            float(row["exit_mrad"]) if row["exit_mrad"] else None,
+        )
+        for row in rows
+    ]
 
 
 def read_truth(path_file: Path, length: int) -> Truth:

@@ -28,8 +28,13 @@ PSEUDOCOUNT = 0.01
 def find_path(radii_mm: list[float], seed: int) -> list[int]:
     """The clone at every step, on the most likely path."""
     symbols = categorise(radii_mm, seed)
+    return find_clones(symbols, [0] * (len(symbols) - 1), seed)
+
+
+def find_clones(symbols: list[int], actions: list[int], seed: int) -> list[int]:
+    """The clone at every step, on the most likely path. The action of a step leads from its symbol to the next."""
     random_numbers = numpy.random.default_rng(seed)
-    candidates = [path for clones in CLONES for path in _ClonedModel(symbols, clones, random_numbers).train()]
+    candidates = [path for clones in CLONES for path in _ClonedModel(symbols, actions, clones, random_numbers).train()]
     # The first of several that are equally good.
     return max(candidates, key=chain_criterion)
 
@@ -37,19 +42,24 @@ def find_path(radii_mm: list[float], seed: int) -> list[int]:
 class _ClonedModel:
     """All restarts of one number of clones, trained side by side.
 
-    The transition matrix of restart r from the clones of one symbol to those of another is `blocks[pair, r]`, with a
-    block only for the pairs of symbols that occur. The first axis of `forward` and `backward` is the step.
+    The transition matrix of restart r from the clones of one symbol by one action to those of another is
+    `blocks[pair, r]`, with a block only for what occurs. The first axis of `forward` and `backward` is the step.
     """
 
-    def __init__(self, symbols: list[int], clones: int, random_numbers: numpy.random.Generator) -> None:
+    def __init__(
+        self, symbols: list[int], actions: list[int], clones: int, random_numbers: numpy.random.Generator
+    ) -> None:
         self.symbols = symbols
         self.clones = clones
-        pairs = sorted(set(zip(symbols, symbols[1:])))
+        steps = list(zip(symbols, actions, symbols[1:]))
+        pairs = sorted(set(steps))
         number_of_pair = {pair: number for number, pair in enumerate(pairs)}
-        self.step_pairs = numpy.array([number_of_pair[pair] for pair in zip(symbols, symbols[1:])], dtype=int)
-        self.pair_starts = numpy.array([start for start, _ in pairs], dtype=int)
+        self.step_pairs = numpy.array([number_of_pair[step] for step in steps], dtype=int)
+        leaves = sorted({(start, action) for start, action, _ in pairs})
+        self.leaves = len(leaves)
+        self.pair_starts = numpy.array([leaves.index((start, action)) for start, action, _ in pairs], dtype=int)
         self.allowed = numpy.ones((len(pairs), 1, clones, clones))
-        for number, (start, end) in enumerate(pairs):
+        for number, (start, _, end) in enumerate(pairs):
             if start == end and clones > 1:
                 self.allowed[number, 0] -= numpy.eye(clones)
         counts = random_numbers.random((len(pairs), RESTARTS, clones, clones))
@@ -71,8 +81,8 @@ class _ClonedModel:
         return [states[:, restart].tolist() for restart in range(RESTARTS)]
 
     def _normalised(self, counts: numpy.ndarray) -> numpy.ndarray:
-        """Divides the counts by the sum over all that may follow a clone, whatever its symbol."""
-        totals = numpy.zeros((max(self.symbols) + 1, RESTARTS, self.clones))
+        """Divides the counts by the sum over all that may follow a clone by an action, whatever its symbol."""
+        totals = numpy.zeros((self.leaves, RESTARTS, self.clones))
         numpy.add.at(totals, self.pair_starts, counts.sum(axis=3))
         return counts / numpy.maximum(totals[self.pair_starts][..., None], numpy.finfo(float).tiny)
 

@@ -14,8 +14,8 @@ from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from statistics import fmean
 
-from measure import PEERS, measure
-from observations import Row, read_radii_mm, read_rows, read_truth
+from measure import PEERS, TOLD_WAYS, measure
+from observations import Row, read_radii_mm, read_rows, read_truth, read_ways
 from path_map import map_of_path
 from score import score_map
 from table import Result, markdown, read_ours
@@ -27,7 +27,8 @@ def evaluate(peer: str, row: Row, length: int, paths: int | None) -> Result:
     radii_mm = [read_radii_mm(file, length) for file in files]
     # Every path has a seed of its own that does not depend on which paths are run.
     seeds = [row.seed * 1_000_003 % 2**31 + int(file.stem) for file in files]
-    measured = measure(peer, radii_mm, seeds)
+    ways = [read_ways(file, length) for file in files] if peer in TOLD_WAYS else None
+    measured = measure(peer, radii_mm, seeds, ways)
     scores = []
     for file, states in zip(files, measured.paths, strict=True):
         truth = read_truth(file, length)
@@ -78,7 +79,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("export", type=Path, metavar="DIR", help="what `toposlam evaluate --export DIR` wrote")
-    parser.add_argument("--peers", type=_peer_names, default=list(PEERS), help=f"some of {','.join(PEERS)}")
+    parser.add_argument("--peers", type=_peer_names, default=list(PEERS), help=f"some of {','.join(PEERS | TOLD_WAYS)}")
     parser.add_argument("--paths", type=_positive, help="only the first so many paths of every set")
     parser.add_argument("--lengths", type=_positive, nargs="+", help="only these lengths")
     parser.add_argument("--ours", type=Path, nargs="+", default=[], metavar="FILE", help="JSON of `toposlam evaluate`")
@@ -90,8 +91,8 @@ def _parser() -> argparse.ArgumentParser:
 def _peer_names(text: str) -> list[str]:
     names = text.split(",")
     for name in names:
-        if name not in PEERS:
-            raise argparse.ArgumentTypeError(f"no peer {name}; there are {', '.join(PEERS)}")
+        if name not in PEERS | TOLD_WAYS:
+            raise argparse.ArgumentTypeError(f"no peer {name}; there are {', '.join(PEERS | TOLD_WAYS)}")
     return names
 
 

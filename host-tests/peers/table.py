@@ -8,6 +8,9 @@ from dataclasses import dataclass
 from pathlib import Path
 
 
+OURS = "toposlam"
+
+
 @dataclass(frozen=True)
 class Result:
     """The means over all paths of one set, one length and one program. Shares lie between 0 and 1."""
@@ -60,14 +63,21 @@ def read_ours(report: Path) -> list[Result]:
 
 
 def markdown(results: Sequence[Result]) -> str:
-    """The table: the sets in the order they first appear in, then by length; within those, the order given."""
-    heads = "set | T | program | paths | exact | isomorphic | edge F1 | smoothed | s/path | peak MiB | working MiB"
+    """The table: the sets in the order they first appear in, then by length; within those, the order given.
+
+    The ratio of the processor times is that of a peer to toposlam.
+    """
+    heads = "set | T | program | paths | exact | isomorphic | edge F1 | smoothed | s/path | ratio | peak MiB | working MiB"
     lines = [f"| {heads} |", "|" + "---|" * (heads.count("|") + 1)]
     names = list(dict.fromkeys(result.name for result in results))
+    ours = {(result.name, result.length): result for result in results if result.program.startswith(OURS)}
     for result in sorted(results, key=lambda result: (names.index(result.name), result.length)):
         cells = [result.name, str(result.length), result.program, str(result.paths)]
         cells += [f"{result.exact:.3f}", f"{result.isomorphic:.3f}"]
         cells += [f"{result.edge_f1:.3f}", f"{result.location_smoothed:.3f}", f"{result.seconds_per_path:.2g}"]
+        one = ours.get((result.name, result.length))
+        is_peer = one is not None and not result.program.startswith(OURS) and one.seconds_per_path > 0
+        cells.append(f"{result.seconds_per_path / one.seconds_per_path:.0f}" if is_peer else "-")
         for mebibytes in (result.peak_mebibytes, result.working_mebibytes):
             cells.append("-" if mebibytes is None else f"{mebibytes:.0f}")
         lines.append("| " + " | ".join(cells) + " |")

@@ -12,7 +12,7 @@ from pathlib import Path
 import peers
 from categories import categorise
 from measure import PEERS, measure
-from observations import read_radii_mm, read_rows, read_truth
+from observations import Ways, read_radii_mm, read_rows, read_truth
 from path_map import PathMap, chain_criterion, map_of_path, undirected
 from score import Score, score_map
 from synthetic_export import (
@@ -168,7 +168,10 @@ class Exports(unittest.TestCase):
         programs = [line.split(" | ")[2] for line in lines[2:]]
         self.assertEqual(programs, [*PEERS, "toposlam paper, hints turn", *PEERS])
         ours_line = "| all-different | 20 | toposlam paper, hints turn | 12 | 0.250 | 0.500 | 0.750 | 0.875 | 0.02 |"
-        self.assertIn(f"{ours_line} - | - |", lines)
+        self.assertIn(f"{ours_line} - | - | - |", lines)
+        ratios = [line.split(" | ")[9] for line in lines[2:]]
+        self.assertTrue(all(float(ratio) > 0 for ratio in ratios[: len(PEERS)]), "the time of a peer over ours")
+        self.assertEqual(set(ratios[len(PEERS) :]), {"-"})
         written = json.loads(results.read_text())["results"]
         self.assertEqual(len(written), 7)
         for result in written:
@@ -198,6 +201,17 @@ class Peers(unittest.TestCase):
                 with self.subTest(peer):
                     result = peers.evaluate(peer, row, 200, None)
                     self.assertEqual((result.edge_f1, result.location_smoothed), (1.0, 1.0))
+
+    def test_the_peer_with_actions_is_told_the_ways(self) -> None:
+        # A corridor with a dead end at 900 mm, a junction and two rooms, one of which looks like the dead end.
+        places = [(900.0, 0), (1500.0, 2), (900.0, 0), (1500.0, 2), (2000.0, 0), (1500.0, 2)] * 8
+        exits = [None, 0.0, -1571.0, 0.0, 1571.0, 0.0]
+        bearings = (-1571.0, 1571.0)
+        ways = [Ways(bearings[:others], exits[step % 6]) for step, (_, others) in enumerate(places)]
+        measured = measure("chmm-actions", [[radius_mm for radius_mm, _ in places]], [1], [ways])
+        self.assertEqual(len(measured.paths[0]), len(places))
+        # The robot turns back at every dead end, so every place of the junction is one.
+        self.assertEqual(len(set(measured.paths[0][1::2])), 1)
 
     def test_a_seed_brings_the_same_path_and_a_short_one_is_no_failure(self) -> None:
         radii_mm = [900.0, 1502.0, 904.0, 2000.0, 1498.0, 900.0, 2006.0, 1500.0, 896.0, 1500.0]

@@ -8,7 +8,8 @@ use super::{
     settings::Settings,
     trial::{Trial, Truth},
 };
-use std::time::{Duration, Instant};
+use crate::processor_time::processor_time;
+use std::time::Duration;
 use toposlam::{Consistency, Direction, Evidence, History, Map, NgramLength};
 
 /// Interval between tests for an exact map, in places; check points are tested, too.
@@ -23,7 +24,7 @@ pub struct PathResult {
     pub judgements: Vec<Judgement>,
     /// Number of times that the filter needed a new vertex and its map was full.
     pub vertices_full: u32,
-    /// Time to map the n-grams of the prior.
+    /// Processor time to map the n-grams of the prior.
     pub prior_time: Duration,
 }
 
@@ -48,19 +49,19 @@ pub struct Judgement {
     /// Whether a long search from the true path ends in another map, which then has the better score; `None` without a
     /// search.
     pub leaves_truth: Option<bool>,
-    /// Time of the filter for the places so far, refinement included.
+    /// Processor time of the filter for the places so far, refinement included.
     pub filter_time: Duration,
 }
 
 /// Runs a filter on a path and judges its maps.
 pub fn judge(trial: &Trial, settings: &Settings, start: Start) -> PathResult {
     let mut candidate = start(settings, trial);
-    let started = Instant::now();
+    let started = processor_time();
     for visit in trial.mapped_before().iter().flatten() {
         candidate.observe(visit.observation);
         candidate.refine(settings.prior_refinement_steps);
     }
-    let prior_time = started.elapsed();
+    let prior_time = processor_time().saturating_sub(started);
 
     let before = trial.places_before();
     let distance_mm = distance_mm(trial, settings);
@@ -70,12 +71,12 @@ pub fn judge(trial: &Trial, settings: &Settings, start: Start) -> PathResult {
     let mut filter_time = Duration::ZERO;
     let mut judgements = Vec::new();
     for (step, visit) in trial.visits.iter().enumerate() {
-        let start = Instant::now();
+        let start = processor_time();
         if step > 0 {
             candidate.refine(settings.refinement_steps);
         }
         candidate.observe(visit.observation);
-        filter_time += start.elapsed();
+        filter_time += processor_time().saturating_sub(start);
 
         let steps = step + 1;
         let path = candidate.path(before + steps);

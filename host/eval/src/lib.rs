@@ -32,6 +32,7 @@ pub mod mapping;
 pub mod parallel;
 mod planar;
 pub mod prior;
+mod processor_time;
 pub mod range_csv;
 pub mod reliability;
 pub mod report;

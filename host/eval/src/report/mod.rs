@@ -228,9 +228,9 @@ pub struct Row {
     /// the same score finds the truth; absent without such a search.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub limit: Option<f64>,
-    /// Wall-clock time to map the n-grams of the prior, in seconds a path, on one thread; differs from run to run.
+    /// Processor time to map the n-grams of the prior, in seconds a path; differs from run to run.
     pub prior_seconds: f64,
-    /// Wall-clock time of one filter update, in seconds, on one thread; differs from run to run.
+    /// Processor time of one filter update and the refinement before it, in seconds; differs from run to run.
     pub seconds_per_place: f64,
 }
 
