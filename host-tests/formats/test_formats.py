@@ -119,9 +119,23 @@ class Formats(unittest.TestCase):
             expected = {key: vertex[key] for key in ("radius_mm", "visits", "x", "y")}
             if ways:
                 frontiers = [str(way["way"]) for way in self.map["frontiers"] if way["vertex"] == number]
-                expected |= {"ways": len(ways[number]), "frontiers": " ".join(frontiers)}
+                bearings = [str(way["bearing_mrad"]) for way in ways[number]]
+                expected |= {"ways": len(ways[number]), "frontiers": " ".join(frontiers), "bearings_mrad": " ".join(bearings)}
             found = {"frontiers": "", **graph.nodes[number]} if ways else graph.nodes[number]
             self.assertEqual(found, {**expected, "robot_is_here": number == self.here})
+
+    def test_graphml_that_networkx_has_written_again_is_the_same_map(self) -> None:
+        named = {**self.map, "vertices": [dict(vertex) for vertex in self.map["vertices"]]}
+        named["vertices"][1]["name"] = "Büro <2>"
+        source, again = (str(Path(self.directory.name) / name) for name in ("named.json", "again.graphml"))
+        Path(source).write_text(json.dumps(named))
+        graph = networkx.read_graphml(io.BytesIO(export(source, "graphml").encode()), node_type=int)
+        networkx.write_graphml(graph, again)
+        found = json.loads(export(again, "json"))
+        for field in ("edges", "ways"):
+            self.assertEqual(found[field], named[field])
+        labels = lambda map: [(v["radius_mm"], v["visits"], v.get("name")) for v in map["vertices"]]
+        self.assertEqual(labels(found), labels(named))
 
     def test_graphviz_keeps_the_positions_and_the_edges(self) -> None:
         dot = export(self.file, "dot")
