@@ -40,7 +40,7 @@ impl<'a> From<&'a Result<(Header, Message), DecodeError>> for Event<'a> {
     }
 }
 
-/// State of a robot, decoded from its stream. Memory: about 6 KiB, no heap.
+/// State of a robot, decoded from its stream. Memory: about 7 KiB, no heap.
 #[derive(Clone, Debug)]
 pub struct Listener {
     decoder: Decoder,
