@@ -122,6 +122,25 @@ fn a_fleet_of_which_no_robot_answers_fails() {
     assert!(text.contains("kitchen failed"), "{text}");
 }
 
+/// Two robots in one plan; whether their maps are certain to be of one building depends on how far they are.
+#[test]
+fn a_fleet_keeps_the_maps_of_its_robots_by_building() {
+    let directory = tempfile::tempdir().unwrap();
+    let (lines, maps) = (path(&directory, "robots.txt"), path(&directory, "maps"));
+    let robots = [Robot::start("127.0.0.1:0", "200"), Robot::start("127.0.0.1:0", "200")];
+    std::fs::write(lines, format!("{} kitchen\n{} hall\n", robots[0].line, robots[1].line)).unwrap();
+    let text = loop {
+        let text = printed(&toposlam(&["fleet", lines, "--seconds", "3", "--maps", maps, "--force"]));
+        if text.contains("kitchen") && text.contains("hall") {
+            break text;
+        }
+    };
+    assert!(text.contains("building 1: ") && text.contains(" from "), "{text}");
+    let file = format!("{maps}/building-1.json");
+    assert!(printed(&toposlam(&["export", &file, "--format", "graphml"])).contains("<node "));
+    assert!(complaint(&toposlam(&["fleet", lines, "--maps", maps])).contains("--force replaces"));
+}
+
 #[cfg(target_os = "linux")]
 #[test]
 fn help_and_version_to_a_full_device_are_errors() {
