@@ -11,12 +11,16 @@ path, before the map is judged.
 
 from __future__ import annotations
 
+from collections import Counter
+
 from categories import categorise
 from observations import Ways
 from peer_cloned_hmm import find_clones
 
 BACK = 0
 UNKNOWN = -1
+LEAST_TURNS = 2
+"""Clones are united if the robot turned back between them this often: a single turn may be a wrong report."""
 
 
 def find_path(radii_mm: list[float], seed: int, ways: list[Ways]) -> list[int]:
@@ -47,7 +51,10 @@ def _places(clones: list[int], actions: list[int]) -> list[int]:
             clone = parent[clone]
         return clone
 
-    for first, last, action in zip(clones, clones[2:], actions[1:]):
-        if action == BACK:
+    turns = Counter(
+        (first, last) for first, last, action in zip(clones, clones[2:], actions[1:]) if action == BACK
+    )
+    for (first, last), count in turns.items():
+        if count >= LEAST_TURNS:
             parent[find(last)] = find(first)
     return [find(clone) for clone in clones]
