@@ -262,7 +262,9 @@ class Inputs(unittest.TestCase):
             for field, default in signature:
                 self.assertEqual(getattr(config, field), int(default), field)
         self.assertEqual(PlaceConfig.for_ring(16), PlaceConfig())
-        self.assertEqual(PlaceConfig.for_ring(8, settle_frames=15).separation_mrad, 1426)
+        eight = PlaceConfig.for_ring(8, settle_frames=15)
+        self.assertEqual((eight.settle_frames, eight.live_sensors_min), (15, 3))
+        self.assertGreater(eight.separation_mrad, PlaceConfig().separation_mrad)
 
 
 class Outputs(unittest.TestCase):
