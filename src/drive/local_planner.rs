@@ -6,7 +6,7 @@ use super::frame::{FACING_MRAD, Frame};
 use super::hall::Hall;
 use super::steering::{heading_mrad, look_round_mrad, speed_beside_permille, speed_permille_at, sway_mrad};
 use super::voronoi::{Sector, meet_point_offset_mm};
-use super::way_back::WayBack;
+use super::way_back::{Gap, WayBack};
 use super::{DriveConfig, VelocityCommand};
 use crate::bearing::{HALF_TURN_MRAD, counter_clockwise_mrad, rotated, turn_mrad};
 use crate::config_error::ConfigError;
@@ -71,6 +71,17 @@ pub enum DriveState {
 /// counter-clockwise, 0 to 6282, ascending.
 pub(super) type Exits = TopK<u16, { Obstacles::MAX }>;
 
+/// The exit to take.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Choice {
+    /// Its bearing relative to the way by which the robot entered, as in [`Exits`].
+    pub(super) exit_mrad: u16,
+    /// Whether no sonar shows it: the map has it.
+    pub(super) is_hidden: bool,
+    /// The door on this way, relative to the exit, where one is known.
+    pub(super) door: Option<Gap>,
+}
+
 /// The largest bearing relative to another, in milliradians.
 const MAX_RELATIVE_MRAD: i32 = 6282;
 
@@ -115,6 +126,8 @@ pub(super) struct LocalPlanner {
     /// Frames in which the robot faced its exit and did not see it.
     search_frames: u16,
     way_back: WayBack,
+    /// Whether no sonar shows the chosen exit.
+    is_hidden: bool,
     departure: Departure,
     /// Whether the robot turned back on its way to the next place.
     is_returning: bool,
@@ -138,6 +151,7 @@ impl LocalPlanner {
             returns: 0,
             search_frames: 0,
             way_back: WayBack::new(),
+            is_hidden: false,
             departure: Departure::UNKNOWN,
             is_returning: false,
             body: Body::new(),
@@ -232,11 +246,12 @@ impl LocalPlanner {
         self.enter(DriveState::FollowEdge);
     }
 
-    /// Processes the newest frame; `choose` returns the bearing of the exit to take, `None` to stop.
+    /// Processes the newest frame; `choose` is given the exits of a place and the door by which the robot came, relative to that way. It
+    /// returns the exit to take, `None` to stop.
     pub(super) fn advance<const SONARS: usize>(
         &mut self,
         frame: &Frame<'_, SONARS>,
-        choose: impl FnOnce(&Exits) -> Option<u16>,
+        choose: impl FnOnce(&Exits, Option<Gap>) -> Option<Choice>,
     ) -> VelocityCommand {
         self.frames = self.frames.saturating_add(1);
         self.way_back.track(frame);
@@ -349,31 +364,45 @@ impl LocalPlanner {
     fn choose_exit<const SONARS: usize>(
         &mut self,
         frame: &Frame<'_, SONARS>,
-        choose: impl FnOnce(&Exits) -> Option<u16>,
+        choose: impl FnOnce(&Exits, Option<Gap>) -> Option<Choice>,
     ) -> VelocityCommand {
         if self.returns > MAX_RETURNS {
             return self.give_up(frame);
         }
+        let narrowest = self.way_back.narrowest(frame.obstacles.radius_mm());
+        let door = narrowest.filter(|gap| gap.is_door);
         if self.exits.as_slice().is_empty() {
             let openings = if self.ways.count() > 0 { self.ways } else { frame.scan.openings(&frame.obstacles) };
             self.track_entry(&openings, frame.rotation_mrad);
-            if openings.count() == 0 {
-                return if self.frames > CHOOSE_FRAMES { self.give_up(frame) } else { VelocityCommand::STOP };
+            // While the robot approaches, another opening may be taken for the way by which it came. The position of a door is not.
+            if openings.nearest(self.entry_mrad, SAME_OPENING_MRAD).is_none()
+                && let Some(door) = door
+                && let Some((_, entry_mrad)) = openings.nearest(door.at.bearing_mrad(), SAME_OPENING_MRAD)
+            {
+                self.entry_mrad = entry_mrad;
+            }
+            if openings.count() == 0 && self.frames <= CHOOSE_FRAMES {
+                return VelocityCommand::STOP;
             }
             for &opening_mrad in openings.bearings_mrad() {
                 let relative_mrad = counter_clockwise_mrad(self.entry_mrad, opening_mrad).min(MAX_RELATIVE_MRAD);
                 self.exits.insert(relative_mrad as u16, |one, other| one <= other);
             }
         }
-        let Some(exit_mrad) = choose(&self.exits) else {
+        let Some(choice) = choose(&self.exits, door.map(|door| door.rotated(-i32::from(self.entry_mrad)))) else {
+            if self.exits.as_slice().is_empty() {
+                return self.give_up(frame);
+            }
             self.enter(DriveState::Stopped);
             return VelocityCommand::STOP;
         };
-        self.departure = Departure::by(exit_mrad);
-        self.target_mrad = rotated(self.entry_mrad, exit_mrad.into());
-        // The edge by which the robot came may end at a door that no sonar looks through from here.
+        self.departure = Departure::by(choice.exit_mrad);
+        self.target_mrad = rotated(self.entry_mrad, choice.exit_mrad.into());
+        self.is_hidden = choice.is_hidden;
+        // The edge may lead through a door that no sonar looks through from here.
         let is_back = turn_mrad(self.entry_mrad, self.target_mrad).abs() < BACK_MRAD;
-        self.way_back.choose(frame, is_back);
+        let known = choice.door.map(|door| door.rotated(self.target_mrad.into()));
+        self.way_back.choose(frame, if is_back { narrowest } else { known });
         if self.way_back.is_taken() {
             self.target_mrad = self.way_back.bearing_mrad();
         }
@@ -402,6 +431,7 @@ impl LocalPlanner {
         let count = self.exits.as_slice().len();
         // A dead end has no other opening.
         let within_mrad = match usize::from(openings.count()) {
+            _ if self.is_hidden => DOUBTFUL_OPENING_MRAD,
             1 if count == 1 => HALF_TURN_MRAD as u16,
             seen if seen == count => SAME_OPENING_MRAD,
             _ => tolerance_mrad(frame, DOUBTFUL_OPENING_MRAD),

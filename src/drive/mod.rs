@@ -12,6 +12,7 @@
 //! | Gaps that the body does not fit through, walls that hold it | `body.rs` |
 //! | The newest frame, and the range ahead | `frame.rs` |
 //! | The way back through a door that no sonar looks through | `way_back.rs` |
+//! | The doors of the ways of the map | `doors.rs` |
 //! | Walls of halls wider than the sonars reach | `hall.rs` |
 //! | Heading and speed along an edge | `steering.rs` |
 //! | The hints of the next observation | `departure.rs` |
@@ -29,6 +30,7 @@
 mod body;
 mod config;
 mod departure;
+mod doors;
 mod frame;
 mod hall;
 mod local_planner;
@@ -122,7 +124,7 @@ impl<const V: usize> Drive<V> {
             return VelocityCommand::STOP;
         }
         let route_planner = &mut self.route_planner;
-        self.local_planner.advance(&Frame::of(detector), |exits| route_planner.choose(filter, exits))
+        self.local_planner.advance(&Frame::of(detector), |exits, door| route_planner.choose(filter, exits, door))
     }
 
     /// How the robot drives from the place that was reported last: the hints of the next observation.

@@ -2,8 +2,10 @@
 
 use rand_core::Rng;
 
-use super::local_planner::Exits;
+use super::doors::Doors;
+use super::local_planner::{Choice, Exits};
 use super::routes::{edge_frames, frames_to};
+use super::way_back::Gap;
 use crate::filter::Filter;
 use crate::filter::draws;
 use crate::map::{DartId, Darts, PerVertex, VertexId};
@@ -22,6 +24,9 @@ const SAME_WAY: u16 = 5736;
 const REFUSED: usize = 8;
 /// After turning back this often on a way, the robot does not explore it.
 const REFUSED_TIMES: u8 = 2;
+
+/// The most exits that are considered at a place.
+const EXITS: usize = 2 * Obstacles::MAX;
 
 /// What the drive is to do.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -68,6 +73,7 @@ pub(super) struct RoutePlanner<const V: usize> {
     chosen: RefusedWay,
     /// The ways on which the robot turned back, the newest first.
     refused: [RefusedWay; REFUSED],
+    doors: Doors,
 }
 
 /// A way on which the robot turned back. With 0 times it is none; so a `static` robot lies in `.bss`.
@@ -93,14 +99,19 @@ impl RefusedWay {
 #[derive(Clone, Copy)]
 struct Here<'a> {
     darts: Darts<'a>,
-    exits: &'a [u16],
-    ways: [Option<DartId>; Obstacles::MAX],
+    /// The bearings of the exits: first those that the sonars show, then those that only the map has.
+    exits: [u16; EXITS],
+    len: usize,
+    ways: [Option<DartId>; EXITS],
 }
 
 impl<'a> Here<'a> {
-    /// Matches exits and ways that are the nearest to each other in bearing. Without `arrival` no exit has a way.
-    fn new(darts: Darts<'a>, arrival: Option<DartId>, exits: &'a Exits) -> Self {
-        let mut here = Self { darts, exits: exits.as_slice(), ways: [None; Obstacles::MAX] };
+    /// Matches exits and ways that are the nearest to each other in bearing. Without `arrival` no exit has a way. Ways of the map that
+    /// no sonar shows are exits too, if `has_door`.
+    fn new(darts: Darts<'a>, arrival: Option<DartId>, exits: &Exits, has_door: impl Fn(DartId) -> bool) -> Self {
+        let mut here = Self { darts, exits: [0; EXITS], len: 0, ways: [None; EXITS] };
+        let exits = exits.as_slice();
+        exits.iter().for_each(|&exit_mrad| here.push(exit_mrad, None));
         let Some((vertex, arrival)) =
             arrival.and_then(|arrival| Some((darts.vertex(arrival)?, darts.bearing(arrival)?)))
         else {
@@ -111,14 +122,28 @@ impl<'a> Here<'a> {
             let off = darts.bearing(way).unwrap_or(0).wrapping_sub(expected) as i16;
             off.unsigned_abs()
         };
-        for (&exit_mrad, slot) in here.exits.iter().zip(&mut here.ways) {
+        for (&exit_mrad, slot) in exits.iter().zip(&mut here.ways) {
             let nearest = darts.ways(vertex).min_by_key(|&way| off(exit_mrad, way));
             *slot = nearest.filter(|&way| {
-                let least = here.exits.iter().map(|&other_mrad| off(other_mrad, way)).min();
+                let least = exits.iter().map(|&other_mrad| off(other_mrad, way)).min();
                 off(exit_mrad, way) <= SAME_WAY && least == Some(off(exit_mrad, way))
             });
         }
+        for way in darts.ways(vertex) {
+            let is_shown = exits.iter().any(|&exit_mrad| off(exit_mrad, way) <= SAME_WAY);
+            if !is_shown && has_door(way) {
+                let relative = darts.bearing(way).unwrap_or(0).wrapping_sub(arrival);
+                here.push((u32::from(relative) * 6283 / 65_536) as u16, Some(way));
+            }
+        }
         here
+    }
+
+    fn push(&mut self, exit_mrad: u16, way: Option<DartId>) {
+        if let (Some(exit), Some(slot)) = (self.exits.get_mut(self.len), self.ways.get_mut(self.len)) {
+            (*exit, *slot) = (exit_mrad, way);
+            self.len += 1;
+        }
     }
 
     fn way(&self, exit: usize) -> Option<DartId> {
@@ -145,6 +170,7 @@ impl<const V: usize> RoutePlanner<V> {
             contrary_places: 0,
             chosen: RefusedWay::NONE,
             refused: [RefusedWay::NONE; REFUSED],
+            doors: Doors::new(),
         }
     }
 
@@ -185,6 +211,7 @@ impl<const V: usize> RoutePlanner<V> {
                 None => *refused = RefusedWay::NONE,
             }
         }
+        self.doors.arrive();
         self.update_completeness(filter);
     }
 
@@ -230,10 +257,15 @@ impl<const V: usize> RoutePlanner<V> {
         }
     }
 
-    /// Chooses the exit of the present place; `None` to stop there. Time O(V² + D).
-    pub(super) fn choose(&mut self, filter: &impl Filter<V>, exits: &Exits) -> Option<u16> {
+    /// Chooses the exit of the present place; `None` to stop there, or without an exit. `door` is that by which the robot came, relative
+    /// to that way. Time O(V² + D).
+    pub(super) fn choose(&mut self, filter: &impl Filter<V>, exits: &Exits, door: Option<Gap>) -> Option<Choice> {
         self.decisions = self.decisions.wrapping_add(1);
-        let here = filter.darts().map(|darts| Here::new(darts, filter.arrival(), exits));
+        self.doors.note(filter, door);
+        let here = filter.darts().map(|darts| {
+            let has_door = |way| self.doors.on(filter, way).is_some();
+            Here::new(darts, filter.arrival(), exits, has_door)
+        });
         self.chosen = RefusedWay::NONE;
         let exit = match self.goal {
             Goal::Stop => None,
@@ -245,13 +277,23 @@ impl<const V: usize> RoutePlanner<V> {
                 }
                 here.and_then(|here| self.towards(target, &here)).or_else(|| self.any(exits))
             }
+        };
+        // Without an exit that the sonars show, any way of the map leads out.
+        let exit = match (exit, here) {
+            (None, Some(here)) if self.goal != Goal::Stop => self.at_random(here.len, |_| true),
+            _ => exit,
         }?;
+        let mut choice =
+            Choice { exit_mrad: exits.as_slice().get(exit).copied().unwrap_or(0), is_hidden: false, door: None };
         if let Some((way, here)) = here.and_then(|here| Some((here.way(exit)?, here)))
             && let (Some(vertex), Some(bearing)) = (here.darts.vertex(way), here.darts.bearing(way))
         {
             self.chosen = RefusedWay { vertex, bearing, times: 1 };
+            let exit_mrad = here.exits.get(exit).copied()?;
+            let is_hidden = exit >= exits.as_slice().len();
+            choice = Choice { exit_mrad, is_hidden, door: self.doors.on(filter, way) };
         }
-        exits.as_slice().get(exit).copied()
+        Some(choice)
     }
 
     /// Updates the status of an active goal.
@@ -285,8 +327,8 @@ impl<const V: usize> RoutePlanner<V> {
             Some(way) if is_due(way) => Some(0),
             _ => here.frames(exit, &frames),
         };
-        let least = (0..here.exits.len()).filter_map(to_way).min()?;
-        self.at_random(here.exits.len(), |exit| to_way(exit) == Some(least))
+        let least = (0..here.len).filter_map(to_way).min()?;
+        self.at_random(here.len, |exit| to_way(exit) == Some(least))
     }
 
     /// The exit with the shortest travel time to the target. If the map has no path, an exit that is new, or that the map does not
@@ -294,11 +336,11 @@ impl<const V: usize> RoutePlanner<V> {
     fn towards(&self, target: VertexId, here: &Here<'_>) -> Option<usize> {
         let frames = frames_to::<V>(here.darts, |vertex| vertex == target);
         let to_target = |exit: usize| here.frames(exit, &frames);
-        let least = (0..here.exits.len()).filter_map(to_target).min();
+        let least = (0..here.len).filter_map(to_target).min();
         let is_new = |exit: usize| here.way(exit).is_none_or(|way| here.darts.partner(way).is_none());
         match least {
-            Some(least) => self.at_random(here.exits.len(), |exit| to_target(exit) == Some(least)),
-            None => self.at_random(here.exits.len(), is_new),
+            Some(least) => self.at_random(here.len, |exit| to_target(exit) == Some(least)),
+            None => self.at_random(here.len, is_new),
         }
     }
 

@@ -8,10 +8,32 @@ use crate::bearing::{Vector, turn_mrad};
 
 /// A door is hidden when a sonar within this angle of it measures its jambs, in milliradians.
 const HIDDEN_MRAD: i32 = 200;
+/// An opening within this angle of a door is that door, in milliradians.
+const SAME_GAP_MRAD: u16 = 500;
 /// The position of a gap is known to about this distance, in thousandths of the way of a frame at full speed.
 const HOME_PERMILLE: i32 = 10_000;
+/// A door is at most this long with its jambs, in thousandths of the way of a frame at full speed: a corridor is longer.
+const DOOR_PERMILLE: u16 = 50_000;
 /// With a command beyond this bearing the robot turns in place, in milliradians.
 const IN_PLACE_MRAD: u16 = 600;
+
+/// A narrow point of an edge, as a door.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Gap {
+    /// Where it is, in thousandths of the way of a ring frame at full speed.
+    pub(super) at: Vector,
+    /// The range of the obstacles beside it.
+    pub(super) range_mm: u16,
+    /// Whether it is as short as a door. Otherwise it is a corridor.
+    pub(super) is_door: bool,
+}
+
+impl Gap {
+    /// The gap after a rotation of the frame of reference.
+    pub(super) fn rotated(self, by_mrad: i32) -> Self {
+        Self { at: self.at.rotated(by_mrad), ..self }
+    }
+}
 
 /// The narrowest point of the edge by which the robot came, and whether it drives back to it. All zero at the start.
 #[derive(Clone, Copy, Debug)]
@@ -20,6 +42,9 @@ pub(super) struct WayBack {
     gap: Vector,
     /// and the range of the obstacles beside it; 0 when the point is unknown.
     gap_mm: u16,
+    /// The range beside the robot where the narrow part began, and its length so far, in thousandths of the way of a frame.
+    start_mm: u16,
+    length_permille: u16,
     /// The radius of the place that the robot left last.
     radius_mm: u16,
     /// Whether the robot drives back to that point, without regard to the obstacles beside it.
@@ -30,7 +55,15 @@ pub(super) struct WayBack {
 
 impl WayBack {
     pub(super) const fn new() -> Self {
-        Self { gap: Vector { x: 0, y: 0 }, gap_mm: 0, radius_mm: 0, is_taken: false, forward_permille: 0 }
+        Self {
+            gap: Vector { x: 0, y: 0 },
+            gap_mm: 0,
+            start_mm: 0,
+            length_permille: 0,
+            radius_mm: 0,
+            is_taken: false,
+            forward_permille: 0,
+        }
     }
 
     /// Whether the robot drives back to the point.
@@ -59,10 +92,16 @@ impl WayBack {
                 .is_none_or(|nearest| u32::from(nearest.range_mm) * 3 >= u32::from(self.gap_mm) * 2);
         let Some(beside_mm) = beside_mm(&frame.scan, Sector::BESIDE) else { return };
         let is_open = frame.ahead.is_none_or(|ahead| ahead.range_mm > beside_mm.saturating_add(beside_mm / 2));
-        if beside_mm <= self.gap_mm && is_open && !is_returning {
-            (self.gap, self.gap_mm) = (Vector { x: 0, y: 0 }, beside_mm);
+        let is_narrow = u32::from(beside_mm) * 4 <= u32::from(self.gap_mm) * 5;
+        if is_narrow && is_open && !is_returning {
+            let is_new = u32::from(beside_mm) * 5 <= u32::from(self.start_mm) * 4 || self.gap.length() > HOME_PERMILLE;
+            if is_new {
+                (self.start_mm, self.length_permille) = (beside_mm, 0);
+            }
+            self.length_permille = self.length_permille.saturating_add(self.forward_permille);
+            (self.gap, self.gap_mm) = (Vector { x: 0, y: 0 }, beside_mm.min(self.gap_mm));
         }
-        let is_there = u32::from(beside_mm) * 4 <= u32::from(self.gap_mm) * 5 || self.gap.x < -2 * HOME_PERMILLE;
+        let is_there = is_narrow || self.gap.x < -2 * HOME_PERMILLE;
         self.is_taken &= !is_there;
     }
 
@@ -75,20 +114,34 @@ impl WayBack {
             if aside_mrad > IN_PLACE_MRAD { 0 } else { velocity.speed_permille.min(on_arc_permille) };
     }
 
-    /// The robot leaves a place, `back` by the way by which it came: it drives to the point if a door there is hidden.
-    pub(super) fn choose<const SONARS: usize>(&mut self, frame: &Frame<'_, SONARS>, back: bool) {
+    /// The narrowest point of the edge by which the robot came to a place of this radius, if it is narrower than two thirds of the radius.
+    pub(super) fn narrowest(&self, radius_mm: u16) -> Option<Gap> {
+        let is_narrow = self.gap_mm > 0 && u32::from(self.gap_mm) * 3 < u32::from(radius_mm) * 2;
+        let is_door = self.length_permille <= DOOR_PERMILLE;
+        is_narrow.then_some(Gap { at: self.gap, range_mm: self.gap_mm, is_door })
+    }
+
+    /// The robot leaves a place by a way with this gap: it drives to the gap if no sonar looks through it, or to a door that one looks through.
+    pub(super) fn choose<const SONARS: usize>(&mut self, frame: &Frame<'_, SONARS>, gap: Option<Gap>) {
         self.radius_mm = frame.obstacles.radius_mm();
-        let is_door = self.gap_mm > 0 && u32::from(self.gap_mm) * 3 < u32::from(self.radius_mm) * 2;
+        let Some(gap) = gap else {
+            self.is_taken = false;
+            return;
+        };
+        (self.gap, self.gap_mm) = (gap.at, gap.range_mm);
+        (self.start_mm, self.length_permille) = (gap.range_mm, 0);
         let gap_mrad = self.gap.bearing_mrad();
         let wall = frame.scan.nearest(|bearing_mrad| turn_mrad(gap_mrad, bearing_mrad).abs() < HIDDEN_MRAD);
         let is_hidden = wall.is_some_and(|wall| u32::from(wall.range_mm) * 5 < u32::from(self.radius_mm) * 8);
-        self.is_taken = back && is_door && is_hidden && self.gap.length() > HOME_PERMILLE;
+        let openings = frame.scan.narrow_openings(&frame.obstacles);
+        let is_narrow = gap.is_door && openings.nearest(gap_mrad, SAME_GAP_MRAD).is_some();
+        self.is_taken = (is_hidden || is_narrow) && self.gap.length() > HOME_PERMILLE;
     }
 
     /// The robot has left a place: the point of the new edge is searched.
     pub(super) fn start_edge(&mut self) {
         if !self.is_taken {
-            self.gap_mm = u16::MAX;
+            (self.gap_mm, self.start_mm, self.length_permille) = (u16::MAX, u16::MAX, 0);
         }
     }
 

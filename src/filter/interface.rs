@@ -70,6 +70,11 @@ pub trait Filter<const V: usize>: Sized {
         None
     }
 
+    /// The way by which the robot came to the place before the last `ago` places, on the best map; `None` where it is not in the history.
+    fn recent_arrival(&self, _ago: usize) -> Option<DartId> {
+        None
+    }
+
     /// Faults since the start: full tables, invalid hints.
     fn faults(&self) -> &FaultCounters;
 

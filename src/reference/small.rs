@@ -52,4 +52,4 @@ pub const fn robot<const S: usize>() -> RobotConfig<S, OrderedConfig> {
 
 const _: () = assert!(size_of::<Filter>() <= 10 * 1024, "the budget of the filter");
 #[cfg(feature = "wire")]
-const _: () = assert!(size_of::<SmallRobot<'static, 16>>() <= 12 * 1024 + 256, "the budget of the robot");
+const _: () = assert!(size_of::<SmallRobot<'static, 16>>() <= 12 * 1024 + 640, "the budget of the robot");

@@ -328,8 +328,12 @@ impl<const N: usize, const V: usize, const D: usize, const T: usize> Filter<V> f
     }
 
     fn recent(&self, ago: usize) -> Option<VertexId> {
+        VertexId::new(self.darts.vertex(self.recent_arrival(ago)?.into()))
+    }
+
+    fn recent_arrival(&self, ago: usize) -> Option<DartId> {
         let index = self.record.len().checked_sub(ago)?.checked_sub(1)?;
-        VertexId::new(self.darts.vertex(*self.path.get(index)?))
+        DartId::new(*self.path.get(index)?)
     }
 
     fn vertex_probability_q16(&self, vertex: VertexId) -> u32 {
