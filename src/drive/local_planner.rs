@@ -321,8 +321,11 @@ impl LocalPlanner {
             return self.give_up(frame);
         }
         let limit_mm = approach_mm(frame).saturating_mul(2);
-        // In the corner of a hall an echo at a flat angle may look like a third wall. The detector does not confirm it.
-        let is_refused = self.hall.is_followed() && self.frames > SEARCH_FRAMES;
+        // In the corner of a hall an echo at a flat angle may look like a third wall, and so may a jamb behind a door. The detector does
+        // not confirm it.
+        let seen_mm = frame.scan.equidistance_mm();
+        let is_far = frame.obstacles.spread_mm().is_some_and(|spread_mm| spread_mm > seen_mm);
+        let is_refused = (self.hall.is_followed() || is_far) && self.frames > SEARCH_FRAMES;
         let is_hidden = frame.obstacles.spread_mm().is_some_and(|spread_mm| spread_mm > limit_mm);
         if is_hidden && !is_refused && has_dead_sensors(frame) && self.frames < SEARCH_FRAMES {
             return VelocityCommand { heading_mrad: look_round_mrad(frame, self.frames), speed_permille: 0 };
@@ -332,7 +335,6 @@ impl LocalPlanner {
             return self.follow_edge(frame, false);
         }
         // Where an approach begins no earlier than the detector sees the meet point, it waits for the detector.
-        let seen_mm = frame.scan.equidistance_mm();
         let is_seen =
             approach_mm(frame) <= seen_mm || frame.obstacles.spread_mm().is_some_and(|spread_mm| spread_mm <= seen_mm);
         if !is_seen && self.frames > MOST_APPROACH_FRAMES {
