@@ -12,6 +12,16 @@ const SAME_WAY: f64 = 0.55;
 /// The log prior of each unit of genus.
 const LN_GENUS: f64 = -7.0;
 
+/// The log prior of another part of the map, and what an edge that connects two parts gains.
+const LN_PART: f64 = -10.0;
+
+/// ln of the share of places that are none, after a place and after the drive was lost; and of the visits that are not detected.
+const LN_SPURIOUS: [f64; 2] = [-6.0, -2.0];
+const LN_MISSED_PLACE: f64 = -8.0;
+
+/// The range of labels in steps.
+const LABELS: f64 = 1000.0;
+
 /// How many visits the prior shares of seen and missed ways stand for: of a way that was seen once, and of others.
 const PRIOR_VISITS: [f64; 2] = [2.0, 20.0];
 
@@ -123,6 +133,8 @@ pub struct Walk {
     labels: Vec<Vec<f64>>,
     looks: Vec<f64>,
     at: Option<usize>,
+    /// After a place that is none: the dart by which the robot left the place before, and ln of the travel time until there.
+    on: Option<(usize, Option<f64>)>,
     /// The sum of all logarithms but those of the labels.
     pub ln_rest: f64,
 }
@@ -165,10 +177,101 @@ impl Walk {
         self.rotation.ways[vertex].sort_by(|&a, &b| ways[a].bearing.total_cmp(&ways[b].bearing));
     }
 
+    /// Takes a visit for a place that is none.
+    pub fn drive_to_no_place(&mut self, model: Model, visit: &Visit) {
+        let exit = self.at.map(|at| self.reported(visit, at).expect("the robot is on an edge"));
+        if let (Some(exit), Some(at)) = (exit, self.at) {
+            self.ln_rest += self.ln_exit(model, visit, at, exit) - visit.ln_travel.map_or(0.0, |_| 2.5_f64.ln());
+        }
+        self.ln_rest += LN_SPURIOUS[usize::from(exit.is_none())] - LABELS.ln();
+        if let Some(others) = &visit.others {
+            self.ln_rest -= 7_f64.ln() + others.len() as f64 * (TAU.ln() - self.ln_unseen(model, 0.0));
+        }
+        self.on = exit.map(|exit| (exit, visit.ln_travel));
+        self.at = None;
+    }
+
+    /// Drives back from a place that is none, or on to the other end of the edge if it is known.
+    pub fn drive_from_no_place(&mut self, model: Model, visit: &Visit, arrival: usize) {
+        let (edge, first) = self.on.take().expect("the place before is none");
+        self.ln_rest += self.ln_ways(model, visit, arrival);
+        if let Some(second) = visit.ln_travel {
+            let known = &self.ways[edge.min(arrival)].ln_travels;
+            let deviation = |count: f64| model.travel.powi(2) * (1.0 + 1.0 / count.min(COUNTS));
+            self.ln_rest += match first {
+                Some(first) if arrival == edge => ln_normal(second - first, deviation(1.0)),
+                Some(first) if !known.is_empty() => {
+                    let (count, sum) = (known.len() as f64, (first.exp() + second.exp()).ln());
+                    ln_normal(sum - known.iter().sum::<f64>() / count, deviation(count))
+                }
+                _ => -(2.5_f64.ln()),
+            };
+        }
+        self.see(visit, arrival);
+        self.at = Some(arrival);
+    }
+
+    /// Passes the place at the other end of `exit` without a detection, and comes to one beyond it by `arrival`.
+    pub fn drive_past(&mut self, model: Model, visit: &Visit, exit: usize, arrival: usize) {
+        let at = self.at.expect("the robot is at a place");
+        let passed = self.rotation.partner[exit].expect("the edge is known");
+        let ways = self.rotation.ways[self.vertex(passed)].len() as f64;
+        self.ln_rest += self.ln_exit(model, visit, at, exit) + LN_MISSED_PLACE - (ways - 1.0).ln();
+        self.ln_rest += self.ln_ways(model, visit, arrival);
+        if let Some(ln_travel) = visit.ln_travel {
+            let second = self.rotation.partner[arrival].expect("the edge is known");
+            let [first, second] = [exit.min(passed), arrival.min(second)].map(|edge| &self.ways[edge].ln_travels);
+            let count = first.len().min(second.len()) as f64;
+            let mean = |known: &[f64]| known.iter().sum::<f64>() / known.len() as f64;
+            self.ln_rest += if count > 0.0 {
+                let sum = (mean(first).exp() + mean(second).exp()).ln();
+                ln_normal(ln_travel - sum, model.travel.powi(2) * (1.0 + 1.0 / count.min(COUNTS)))
+            } else {
+                -(2.5_f64.ln())
+            };
+        }
+        self.see(visit, arrival);
+        self.at = Some(arrival);
+    }
+
+    /// The dart of the reported exit, to which the robot came by `at`.
+    pub fn reported(&self, visit: &Visit, at: usize) -> Option<usize> {
+        let bearing = visit.exit?;
+        if bearing == 0.0 {
+            return Some(at);
+        }
+        let target = self.ways[at].bearing + bearing;
+        let off = |way: &usize| difference(target, self.ways[*way].bearing).abs();
+        let ways = &self.rotation.ways[self.vertex(at)];
+        ways.iter().copied().min_by(|a, b| off(a).total_cmp(&off(b))).filter(|way| off(way) <= SAME_WAY)
+    }
+
+    /// The dart by which the robot came to the newest place; `None` at a place that is none.
+    pub fn at(&self) -> Option<usize> {
+        self.at
+    }
+
+    /// Whether the other end of a dart is known.
+    pub fn is_driven(&self, dart: usize) -> bool {
+        self.rotation.partner[dart].is_some()
+    }
+
+    /// Whether two darts are ways of one vertex.
+    pub fn are_ways_of_one(&self, a: usize, b: usize) -> bool {
+        b < self.darts() && self.vertex(a) == self.vertex(b)
+    }
+
+    /// The edge on which the robot is after a place that is none, as a dart.
+    pub fn edge(&self) -> Option<usize> {
+        self.on.map(|(edge, _)| edge)
+    }
+
     /// Drives to the next place: by the way `exit` to the way `arrival`, both numbered in the order in which they were seen first.
     /// An exit that no visit has shown has the next number.
     pub fn drive(&mut self, model: Model, visit: &Visit, exit: Option<usize>, arrival: usize) {
         let is_unseen = exit == Some(self.darts());
+        // The travel time from a place that is none is not that of the edge.
+        let is_timed = self.on.take().is_none();
         if let (Some(exit), Some(at)) = (exit, self.at) {
             self.ln_rest += self.ln_exit(model, visit, at, exit);
             if is_unseen {
@@ -188,6 +291,9 @@ impl Walk {
             self.labels.push(Vec::new());
             self.looks.push(0.0);
             self.ln_rest += (vertices + 1.0).ln();
+            if exit.is_none() && vertices > 0.0 {
+                self.ln_rest += LN_PART;
+            }
             if let Some(others) = &visit.others {
                 self.ln_rest -= 7_f64.ln() + others.len() as f64 * (TAU.ln() - self.ln_unseen(model, 0.0));
             }
@@ -204,7 +310,7 @@ impl Walk {
         if let Some(exit) = exit {
             self.rotation.partner[exit] = Some(arrival);
             self.rotation.partner[arrival] = Some(exit);
-            if let Some(ln_travel) = visit.ln_travel {
+            if let Some(ln_travel) = visit.ln_travel.filter(|_| is_timed) {
                 self.ways[exit.min(arrival)].ln_travels.push(ln_travel);
             }
         }
@@ -213,13 +319,11 @@ impl Walk {
     }
 
     fn ln_exit(&self, model: Model, visit: &Visit, at: usize, exit: usize) -> f64 {
-        let ways = &self.rotation.ways[self.vertex(at)];
-        let degree = ways.len() as f64;
-        let Some(bearing) = visit.exit else { return -degree.ln() };
-        let target = self.ways[at].bearing + bearing;
-        let off = |&way: &usize| difference(target, self.ways[way].bearing).abs();
-        let reported = ways.iter().copied().min_by(|a, b| off(a).total_cmp(&off(b)));
-        let reported = if bearing == 0.0 { Some(at) } else { reported.filter(|way| off(way) <= SAME_WAY) };
+        let degree = self.rotation.ways[self.vertex(at)].len() as f64;
+        if visit.exit.is_none() {
+            return -degree.ln();
+        }
+        let reported = self.reported(visit, at);
         match reported {
             None if exit == self.darts() => {
                 (1.0 - model.wrong_exit).ln() - (degree + 1.0).ln() + self.ln_unseen(model, self.looks[self.vertex(at)])
@@ -256,10 +360,11 @@ impl Walk {
         let mut closed = self.rotation.clone();
         closed.partner[exit] = Some(arrival);
         closed.partner[arrival] = Some(exit);
+        let connected = if closed.components() < self.rotation.components() { -LN_PART } else { 0.0 };
         let raised = closed.genus() as f64 - self.rotation.genus() as f64;
         // Where an unseen exit lies among the ways is not certain.
         let raised = if is_unseen { 0.0 } else { raised };
-        ln_travel - (frontiers as f64).ln() + raised * LN_GENUS
+        ln_travel - (frontiers as f64).ln() + raised * LN_GENUS + connected
     }
 
     /// ln P that no visit of some has shown a way.

@@ -92,6 +92,8 @@ pub struct Robot<'a> {
     /// The dart by which the robot came to the newest place.
     pub at: usize,
     left: Option<(Exit, u16)>,
+    /// The frames of the corridor that are left after a place that is none.
+    rest: Option<u16>,
     is_kidnapping_reported: bool,
     is_started: bool,
 }
@@ -99,7 +101,7 @@ pub struct Robot<'a> {
 impl<'a> Robot<'a> {
     pub fn new(building: &'a Building, seed: u64) -> Self {
         let random = Random(seed);
-        Self { building, random, at: 0, left: None, is_kidnapping_reported: true, is_started: false }
+        Self { building, random, at: 0, left: None, rest: None, is_kidnapping_reported: true, is_started: false }
     }
 
     /// Carries the robot to another place.
@@ -116,18 +118,63 @@ impl<'a> Robot<'a> {
     /// Drives to the next place, unless the robot was carried off, and observes it.
     pub fn step(&mut self) -> Observation {
         if self.is_started {
-            let place = self.building.place(self.at);
-            let others = self.others();
-            let exit = self.random.below(others.len() + 1);
-            let (reported, left) = match exit.checked_sub(1) {
-                None => (Exit::Back, self.at),
-                Some(other) => (Exit::from_bearing_mrad(others[other].0).unwrap(), others[other].1),
-            };
-            assert_eq!(self.building.place(left), place);
-            let (_, partner, frames) = self.building.way(left);
-            self.left = Some((reported, frames));
-            self.at = partner;
+            self.left = Some(self.leave());
         }
+        self.observe()
+    }
+
+    /// Drives half a corridor, and reports a place there that is none.
+    pub fn step_to_no_place(&mut self, radius_mm: u16) -> Observation {
+        let (exit, frames) = self.leave();
+        // Half of the corridor is left.
+        self.rest = Some(frames - frames / 2);
+        Observation {
+            ways: Ways::from_bearings_mrad(&[3142]).ok(),
+            exit: Some(exit),
+            travel_frames: Some(frames / 2),
+            ..Observation::new(Fingerprint::from_radius_mm(radius_mm).unwrap())
+        }
+    }
+
+    /// Drives on from a place that is none, or back.
+    pub fn step_from_no_place(&mut self, goes_back: bool) -> Observation {
+        if goes_back {
+            self.at = self.building.partner(self.at);
+        }
+        let exit = if goes_back { Exit::Back } else { Exit::Bearing(128) };
+        self.left = self.rest.take().map(|frames| (exit, frames));
+        self.observe()
+    }
+
+    /// Passes a place that is not detected, and observes the next one.
+    pub fn step_past(&mut self) -> Observation {
+        let (exit, frames) = self.leave();
+        let passed = self.at;
+        let mut more = (Exit::Back, 0);
+        while more.0 == Exit::Back && self.building.ways[self.building.place(passed)].len() > 1 {
+            self.at = passed;
+            more = self.leave();
+        }
+        self.left = Some((exit, frames + more.1));
+        self.observe()
+    }
+
+    /// Leaves the place by any exit, and comes to the other end of the corridor. Returns the exit and the frames of the corridor.
+    fn leave(&mut self) -> (Exit, u16) {
+        let place = self.building.place(self.at);
+        let others = self.others();
+        let exit = self.random.below(others.len() + 1);
+        let (reported, left) = match exit.checked_sub(1) {
+            None => (Exit::Back, self.at),
+            Some(other) => (Exit::from_bearing_mrad(others[other].0).unwrap(), others[other].1),
+        };
+        assert_eq!(self.building.place(left), place);
+        let (_, partner, frames) = self.building.way(left);
+        self.at = partner;
+        (reported, frames)
+    }
+
+    fn observe(&mut self) -> Observation {
         let bearings: Vec<u16> = self.others().iter().map(|&(bearing, _)| bearing).collect();
         let noise_mm = 2 * self.random.below(9) as u16;
         let radius_mm = self.building.radius_mm[self.building.place(self.at)] + noise_mm;

@@ -4,6 +4,7 @@ mod bad_input;
 mod building;
 mod localisation;
 mod long_runs;
+mod outliers;
 #[path = "../common/split_mix.rs"]
 mod split_mix;
 

@@ -35,11 +35,12 @@ impl<const N: usize, const V: usize, const D: usize, const T: usize> Beam<N, V, 
             });
         }
         let Some(best) = chosen.as_slice().first() else { return true };
-        let mut lacks_room = missed > best.score || best.choice.0.target == Target::OffMap;
+        let mut lacks_room = missed > best.score;
         let entry = record.get(index);
         self.replace(&mut chosen, |hypothesis, &(choice, gain), rank| {
             let is_full = hypothesis.extend(&entry, index, choice, gain, 0);
-            lacks_room |= is_full && rank == 0;
+            let is_off_map = !hypothesis.is_on_map() && !hypothesis.has_room_for_vertex();
+            lacks_room |= (is_full || is_off_map) && rank == 0;
         });
         lacks_room
     }

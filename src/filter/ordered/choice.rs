@@ -1,9 +1,9 @@
 //! The ways to explain a place: where the robot left the place before and where it came to.
 
-use super::model::Model;
+use super::model::{LN_PART, Model};
 use crate::map::{Bearing, DartSet, VertexId, VertexSet};
 
-/// In a path: a place that is not on the map.
+/// In a path: a place that is not on the map, or no place.
 pub(crate) const OFF_MAP: u8 = 254;
 
 /// As an exit: a way that no visit has shown.
@@ -20,6 +20,12 @@ pub(super) enum Target {
     At(u8),
     /// A way with this bearing of a vertex that is on the map, which no visit has shown.
     Unseen(u8, Bearing),
+    /// Back to the vertex that the robot left, by the way by which it left it.
+    Back,
+    /// By this way, beyond a vertex at the other end of the edge that was not detected.
+    Beyond(u8),
+    /// No place: the robot is on the edge that it took. Whether a place on this edge was none before.
+    Spurious(bool),
     /// A place that has no vertex on the map, and for which the map has no room.
     OffMap,
 }
@@ -42,6 +48,8 @@ pub(super) enum ReportedExit {
     Unseen,
     /// Any but this one, by which it came.
     NotBack(u8),
+    /// It is the edge on which the robot is: the place before was none. The logarithm of the travel time until there; 0 if it is unknown.
+    Before(u16),
 }
 
 impl ReportedExit {
@@ -54,6 +62,7 @@ impl ReportedExit {
             Self::Way(_) | Self::Unseen => model.ln_wrong_exit(ways.saturating_sub(1)),
             Self::NotBack(came_by) if came_by != exit => model.right_exit,
             Self::NotBack(_) => model.ln_wrong_exit(1),
+            Self::Before(_) => return 0.0,
         };
         report - model.ln_of(ways)
     }
@@ -72,6 +81,12 @@ pub(super) struct Closures {
 
 impl Closures {
     pub(super) const NONE: Self = Self { face: DartSet::EMPTY, connected: VertexSet::EMPTY, frontiers: 0 };
+
+    /// What an edge to a vertex gains if it connects two parts of the map.
+    pub(super) fn connect(&self, vertex: u8) -> f32 {
+        let is_connected = VertexId::new(vertex).is_some_and(|vertex| self.connected.contains(vertex));
+        if is_connected { 0.0 } else { -LN_PART }
+    }
 
     /// Whether an edge to a frontier leaves the genus as it is.
     pub(super) fn keep_genus(&self, exit: u8, frontier: u8, vertex: u8) -> bool {

@@ -5,9 +5,9 @@
 //! algorithm with a beam), and stops where the best of them is on the path again. The map changes only by edges between two
 //! frontiers that the decoded path passes.
 
-use super::choice::{ReportedExit, UNSEEN};
+use super::choice::{OFF_MAP, ReportedExit, UNSEEN};
 use super::hypothesis::Hypothesis;
-use super::model::Model;
+use super::model::{LN_MISSED_PLACE, LN_PART, Model};
 use super::record::Record;
 use super::replay::WORST_EXIT;
 use crate::map::{NONE, VertexId, VertexSet};
@@ -34,7 +34,7 @@ const LOST: f32 = 10.0;
 const BEHIND_BY_EDGE: f32 = 40.0;
 const BEHIND_ANYWHERE: f32 = 30.0;
 
-/// A way by which the robot may have come to a place: [`NONE`] for a place that is not on the map.
+/// A way by which the robot may have come to a place: [`NONE`] for a place that is not on the map, [`OFF_MAP`] for one that is none.
 #[derive(Clone, Copy, Debug)]
 struct State {
     came_by: u8,
@@ -200,14 +200,20 @@ impl Decoder {
         index: usize,
     ) -> bool {
         let came_by = on.came_by(index);
+        let before = index.checked_sub(1).map_or(NONE, |before| on.came_by(before));
+        if came_by == OFF_MAP {
+            return !record.get(index).starts() && (before >= UNSEEN || self.is_removed(on.map.vertex(before)));
+        }
         if came_by >= UNSEEN || self.is_removed(on.map.vertex(came_by)) {
             return true;
         }
-        if record.get(index).starts() || index == 0 {
+        if record.get(index).starts() || index == 0 || before == OFF_MAP {
             return false;
         }
-        let before = on.came_by(index - 1);
-        on.map.partner(came_by).is_none_or(|exit| before < UNSEEN && on.map.vertex(exit) != on.map.vertex(before))
+        let Some(exit) = on.map.partner(came_by) else { return true };
+        before < UNSEEN
+            && on.map.vertex(exit) != on.map.vertex(before)
+            && on.exit_before(record, index, before, exit).is_none()
     }
 
     fn begin(&mut self, state: State) {
@@ -257,13 +263,35 @@ impl Decoder {
         }
         for index in end - places + 1..end {
             let (before, now) = (on.came_by(index - 1), on.came_by(index));
-            if before >= UNSEEN || now >= UNSEEN || record.get(index).starts() || on.map.partner(now).is_some() {
+            if now >= UNSEEN || record.get(index).starts() || on.map.partner(now).is_some() {
                 continue;
             }
-            if let ReportedExit::Way(exit) = on.reported_exit(record, index, before) {
+            let exit = match before {
+                OFF_MAP => index.checked_sub(2).and_then(|before| {
+                    on.edge_between(record, index - 1, on.came_by(before)).filter(|&edge| edge != now)
+                }),
+                _ => on.edge_between(record, index, before),
+            };
+            if let Some(exit) = exit {
                 on.map.join(exit, now);
             }
         }
+    }
+
+    /// The edge on which the robot is before place `index`, if the place before is none in a state.
+    fn edge_under<const V: usize, const D: usize, const T: usize>(
+        &self,
+        record: &Record<T>,
+        on: &Hypothesis<V, D, T>,
+        index: usize,
+        state: State,
+    ) -> Option<u8> {
+        let states = self.states.get(usize::from(self.places).checked_sub(2)?)?;
+        let from = states.get(usize::from(state.before)).filter(|_| state.came_by == OFF_MAP)?.came_by;
+        if record.get(index).starts() {
+            return None;
+        }
+        on.edge_between(record, index.checked_sub(1)?, from)
     }
 
     fn step<const V: usize, const D: usize, const T: usize>(
@@ -276,30 +304,62 @@ impl Decoder {
         let mut next = Next::new();
         let entry = record.get(index);
         let anywhere = model.ln_of(on.map.darts().into());
-        let off_map = on.new_arrival(model, &entry).total();
+        let off_map = on.new_arrival(model, &entry).total() + if entry.starts() { LN_PART } else { 0.0 };
+        let spurious = |again| on.spurious(model, &entry, again).total();
         let arrive = |next: &mut Next, dart: u8, before: usize, cost: f32| {
             if on.map.vertex(dart) == NONE
                 || self.is_removed(on.map.vertex(dart))
                 || on.is_far(model, entry.steps, on.map.vertex(dart))
             {
-                return;
+                return false;
             }
             next.work += 1;
             next.insert(dart, before, cost + on.arrival(model, &entry, dart).total());
+            true
+        };
+        // By an edge between two frontiers.
+        let close = |next: &mut Next, exit: u8, before: usize, cost: f32| {
+            let cost = cost + model.closure(on.map.frontiers().count(), true) + model.travel((0, 0), entry.ln_travel);
+            for frontier in on.map.frontiers() {
+                if frontier != exit && ![(exit, frontier), (frontier, exit)].contains(&self.apart) {
+                    arrive(next, frontier, before, cost);
+                }
+            }
         };
         if self.places == 0 {
-            (0..on.map.darts()).for_each(|dart| arrive(&mut next, dart, 0, -anywhere));
+            for dart in 0..on.map.darts() {
+                arrive(&mut next, dart, 0, -anywhere);
+            }
             next.insert(NONE, 0, off_map);
             return next;
         }
         let states = self.states.get(usize::from(self.places) - 1).copied().unwrap_or([State::ZERO; STATES]);
         for (before, (state, &score)) in states.iter().zip(&self.scores).take(self.count.into()).enumerate() {
-            if state.came_by == NONE || entry.starts() {
+            if state.came_by >= UNSEEN || entry.starts() {
+                if let Some(edge) = self.edge_under(record, on, index, *state) {
+                    let reported = on.reported_exit(record, index, OFF_MAP);
+                    for end in on.ends_ahead(&entry, edge) {
+                        let travel = if end == edge {
+                            on.travel_back(model, &entry, reported)
+                        } else {
+                            on.travel_along(model, &entry, reported, edge)
+                        };
+                        arrive(&mut next, end, before, score + travel);
+                    }
+                    if on.map.partner(edge).is_none() {
+                        close(&mut next, edge, before, score);
+                    }
+                }
                 next.insert(NONE, before, score + off_map);
+                if entry.starts() {
+                    next.insert(OFF_MAP, before, score + spurious(false));
+                }
                 if next.behind(score - anywhere) > BEHIND_ANYWHERE {
                     continue;
                 }
-                (0..on.map.darts()).for_each(|dart| arrive(&mut next, dart, before, score - anywhere));
+                for dart in 0..on.map.darts() {
+                    arrive(&mut next, dart, before, score - anywhere);
+                }
                 continue;
             }
             next.insert(NONE, before, score + off_map - LOST);
@@ -315,23 +375,29 @@ impl Decoder {
                 if exit_cost < WORST_EXIT {
                     continue;
                 }
+                let is_reported = reported == ReportedExit::Way(exit);
+                if is_reported {
+                    next.insert(OFF_MAP, before, cost + spurious(on.is_spurious_again(record, index, exit)));
+                }
                 match on.map.partner(exit) {
                     Some(partner) if !self.is_removed(on.map.vertex(partner)) => {
                         if next.behind(cost) < BEHIND_BY_EDGE {
                             let travel = model.travel(on.map.travel(partner), entry.ln_travel);
-                            arrive(&mut next, partner, before, cost + travel);
+                            let is_near = arrive(&mut next, partner, before, cost + travel);
+                            if is_reported && !is_near {
+                                let ways = on.map.ways(on.map.vertex(partner)).len();
+                                let missed = LN_MISSED_PLACE - model.ln_of(ways.saturating_sub(1));
+                                for dart in on.ways_beyond(exit) {
+                                    let travel = on.travel_beyond(model, &entry, exit, dart);
+                                    arrive(&mut next, dart, before, cost + missed + travel);
+                                }
+                            }
                         }
                     }
                     _ => {
                         next.insert(NONE, before, cost + off_map);
-                        if reported == ReportedExit::Way(exit) {
-                            let frontiers = on.map.frontiers().count();
-                            let closure = cost + model.closure(frontiers, true) + model.travel((0, 0), entry.ln_travel);
-                            for frontier in on.map.frontiers().filter(|&frontier| {
-                                frontier != exit && ![(exit, frontier), (frontier, exit)].contains(&self.apart)
-                            }) {
-                                arrive(&mut next, frontier, before, closure);
-                            }
+                        if is_reported {
+                            close(&mut next, exit, before, cost);
                         }
                     }
                 }

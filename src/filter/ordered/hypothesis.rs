@@ -2,11 +2,11 @@
 
 use super::choice::{Choice, Closures, Gain, OFF_MAP, ReportedExit, Target, UNSEEN};
 use super::label::Label;
-use super::model::{LN_WAYS, Model, SAME_WAY};
+use super::model::{LN_PART, LN_WAYS, Model, SAME_WAY};
 use super::record::{Entry, Record};
 use crate::filter::Exit;
 use crate::filter::beam::Ranked;
-use crate::map::{Bearing, DartMap, NONE, WAYS_MAX};
+use crate::map::{Bearing, DartMap, DartSet, NONE, WAYS_MAX};
 
 /// Labels that are this many standard deviations off are not looked at.
 const FAR: f32 = 5.0;
@@ -135,6 +135,9 @@ impl<const V: usize, const D: usize, const T: usize> Hypothesis<V, D, T> {
 
     /// What observation `index` says of the exit that led to it, when the robot came to the place before by `from`.
     pub(super) fn reported_exit(&self, record: &Record<T>, index: usize, from: u8) -> ReportedExit {
+        if from == OFF_MAP {
+            return ReportedExit::Before(record.get(index.wrapping_sub(1)).ln_travel);
+        }
         let bearing = match record.get(index).exit() {
             None => return ReportedExit::Unknown,
             Some(Exit::On) => return ReportedExit::NotBack(from),
@@ -163,7 +166,7 @@ impl<const V: usize, const D: usize, const T: usize> Hypothesis<V, D, T> {
         mut proposed: impl FnMut(Choice, Gain),
     ) {
         let entry = record.get(index);
-        if !self.has_room(Choice { exit: NONE, target: Target::New }) {
+        if !self.has_room_for_vertex() {
             proposed(Choice { exit: NONE, target: Target::OffMap }, Gain { labels: 0.0, rest: LN_OFF_MAP });
         }
         if !self.is_on_map() || entry.starts() {
@@ -172,8 +175,14 @@ impl<const V: usize, const D: usize, const T: usize> Hypothesis<V, D, T> {
                 proposed(choice, self.gain(model, &entry, ReportedExit::Unknown, choice));
             };
             propose(Target::New);
+            if entry.starts() && self.map.vertices() > 0 {
+                propose(Target::Spurious(false));
+            }
             let near = |&dart: &u8| !self.is_far(model, entry.steps, self.map.vertex(dart));
             (0..self.map.darts()).filter(near).for_each(|dart| propose(Target::At(dart)));
+            if let Some(edge) = self.edge_under(record, index) {
+                self.propose_along(model, record, index, edge, proposed);
+            }
             return;
         }
         let reported = self.reported_exit(record, index, self.at);
@@ -191,8 +200,15 @@ impl<const V: usize, const D: usize, const T: usize> Hypothesis<V, D, T> {
                 let choice = Choice { exit, target };
                 proposed(choice, self.gain_with(model, &entry, reported, choice, &closures));
             };
+            let is_reported = reported == ReportedExit::Way(exit);
+            if is_reported {
+                propose(Target::Spurious(self.is_spurious_again(record, index, exit)));
+            }
             if is_known {
                 propose(Target::Known);
+                if is_reported {
+                    self.ways_beyond(exit).for_each(|way| propose(Target::Beyond(way)));
+                }
                 continue;
             }
             propose(Target::New);
@@ -233,10 +249,17 @@ impl<const V: usize, const D: usize, const T: usize> Hypothesis<V, D, T> {
             Target::At(dart) => self.arrival(model, entry, dart),
             Target::Unseen(vertex, bearing) => self.unseen_arrival(model, entry, vertex, bearing),
             Target::Known => self.arrival(model, entry, self.map.partner(exit).unwrap_or(NONE)),
+            Target::Back => self.arrival(model, entry, exit),
+            Target::Beyond(dart) => self.arrival_beyond(model, entry, exit, dart),
+            Target::Spurious(again) => self.spurious(model, entry, again),
             Target::OffMap => return Gain { labels: 0.0, rest: LN_OFF_MAP },
         };
         if exit == NONE {
-            gain.rest -= if target == Target::New { 0.0 } else { model.ln_of(self.map.darts().into()) };
+            gain.rest += match target {
+                Target::New if self.map.vertices() > 0 => LN_PART,
+                Target::New | Target::Spurious(_) => 0.0,
+                _ => -model.ln_of(self.map.darts().into()),
+            };
             return gain;
         }
         let vertex = self.map.vertex(self.at);
@@ -246,12 +269,15 @@ impl<const V: usize, const D: usize, const T: usize> Hypothesis<V, D, T> {
             _ => reported.ln(model, exit, ways),
         };
         gain.rest += match target {
-            Target::Known => model.travel(self.map.travel(exit), entry.ln_travel),
-            Target::New | Target::OffMap => model.travel((0, 0), entry.ln_travel),
+            Target::Known => self.travel_along(model, entry, reported, exit),
+            Target::Back => self.travel_back(model, entry, reported),
+            Target::Beyond(dart) => self.travel_beyond(model, entry, exit, dart),
+            Target::New | Target::Spurious(_) | Target::OffMap => model.travel((0, 0), entry.ln_travel),
             Target::At(dart) => {
                 model.travel((0, 0), entry.ln_travel) + {
                     let vertex = self.map.vertex(dart);
                     model.closure(closures.frontiers.into(), closures.keep_genus(exit, dart, vertex))
+                        + closures.connect(vertex)
                 }
             }
             Target::Unseen(vertex, bearing) => {
@@ -259,6 +285,7 @@ impl<const V: usize, const D: usize, const T: usize> Hypothesis<V, D, T> {
                 let next = self.way_after(vertex, bearing);
                 model.travel((0, 0), entry.ln_travel)
                     + model.closure(usize::from(closures.frontiers) + 1, closures.keep_genus(exit, next, vertex))
+                    + closures.connect(vertex)
             }
         };
         gain
@@ -267,11 +294,10 @@ impl<const V: usize, const D: usize, const T: usize> Hypothesis<V, D, T> {
     /// What an edge from an exit to each frontier does to the map. Cost: O(D).
     fn closures(&self, exit: u8) -> Closures {
         let frontiers = self.map.frontiers().count() as u8;
-        if exit == UNSEEN {
-            return Closures { frontiers, ..Closures::NONE };
-        }
-        let connected = self.map.component_of(self.map.vertex(exit));
-        Closures { face: self.map.face_of(exit), connected, frontiers }
+        let is_unseen = exit == UNSEEN;
+        let connected = self.map.component_of(self.map.vertex(if is_unseen { self.at } else { exit }));
+        let face = if is_unseen { DartSet::EMPTY } else { self.map.face_of(exit) };
+        Closures { face, connected, frontiers }
     }
 
     /// The key that the hypothesis would have with a choice.
@@ -283,7 +309,9 @@ impl<const V: usize, const D: usize, const T: usize> Hypothesis<V, D, T> {
             Target::Known => (self.map.partner(choice.exit).unwrap_or(NONE), false),
             Target::New | Target::Unseen(..) => (added, exit != NONE),
             Target::At(dart) => (dart, exit != NONE),
-            Target::OffMap => (OFF_MAP, false),
+            Target::Back => (exit, false),
+            Target::Beyond(dart) => (dart, false),
+            Target::Spurious(_) | Target::OffMap => (OFF_MAP, false),
         };
         let vertex = match choice.target {
             Target::New => self.map.vertices(),
@@ -294,6 +322,11 @@ impl<const V: usize, const D: usize, const T: usize> Hypothesis<V, D, T> {
         let map_key =
             if is_joined { self.map_key.wrapping_add(edge_key((exit, from), (at, vertex))) } else { self.map_key };
         keyed(map_key, at)
+    }
+
+    /// Whether there is room for another vertex.
+    pub(super) fn has_room_for_vertex(&self) -> bool {
+        self.has_room(Choice { exit: NONE, target: Target::New })
     }
 
     /// Whether there is room for what a choice adds.
@@ -329,20 +362,25 @@ impl<const V: usize, const D: usize, const T: usize> Hypothesis<V, D, T> {
             }
             Target::At(dart) => dart,
             Target::Unseen(vertex, bearing) => self.map.add_way(vertex, bearing).unwrap_or(NONE),
-            Target::OffMap => OFF_MAP,
+            Target::Back => exit,
+            Target::Beyond(dart) => dart,
+            Target::Spurious(_) | Target::OffMap => OFF_MAP,
         };
+        // The travel time is that of one edge only without places that are none or were not detected.
+        let is_timed = entry.ln_travel > 0 && self.is_on_map() && !matches!(choice.target, Target::Beyond(_));
         self.at = at;
         if let Some(slot) = self.path.get_mut(index) {
             *slot = at;
         }
-        if choice.target == Target::OffMap {
+        if at == OFF_MAP {
             return false;
         }
-        if choice.target != Target::Known && exit != NONE {
+        let joins = matches!(choice.target, Target::New | Target::At(_) | Target::Unseen(..));
+        if joins && exit != NONE {
             self.map.join(exit, at);
             self.map_key = self.map_key.wrapping_add(self.edge_key(exit, at));
         }
-        if entry.ln_travel > 0 && exit != NONE {
+        if is_timed && exit != NONE {
             self.map.time(at, entry.ln_travel);
         }
         self.visit(entry, at)

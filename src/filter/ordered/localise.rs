@@ -8,8 +8,7 @@ use super::record::Record;
 use super::{OrderedConfig, OrderedFilter};
 use crate::config_error::ConfigError;
 use crate::filter::Filter;
-use crate::map::DartMap;
-use crate::map::Map;
+use crate::map::{DartMap, Map, NONE};
 use crate::place::Fingerprint;
 
 /// The log prior of a kidnapping that was not reported, in nats.
@@ -74,10 +73,13 @@ impl<const N: usize, const V: usize, const D: usize, const T: usize> OrderedFilt
             self.beam.keep_best();
             return;
         }
-        self.localised_from = None;
+        let localised_from = self.localised_from.take().unwrap_or(0);
         if let Some(best) = self.beam.best() {
             self.source.clone_from(best);
         }
+        // Places that were not on the map may be new ones.
+        let localised = self.source.path.iter_mut().take(self.record.len()).skip(localised_from);
+        localised.filter(|came_by| **came_by == OFF_MAP).for_each(|came_by| *came_by = NONE);
         if !self.rebuild_with_decisions() {
             self.forget_record();
         }

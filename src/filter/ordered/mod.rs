@@ -17,6 +17,7 @@ mod localise;
 mod logarithm;
 mod model;
 mod noise;
+mod outliers;
 mod publish;
 mod record;
 mod removal;

@@ -19,6 +19,20 @@ pub(super) const SAME_WAY: u16 = 5736;
 /// The price of a unit of genus, in nats: on one floor corridors cross only at ramps and bridges.
 const GENUS: f32 = 7.0;
 
+/// ln of the share of places that are none: after a place; on an edge on which one was none before; and after the drive was lost.
+pub(super) const LN_SPURIOUS: f32 = -6.0;
+pub(super) const LN_SPURIOUS_AGAIN: f32 = -14.0;
+pub(super) const LN_SPURIOUS_START: f32 = -2.0;
+
+/// ln of the density of the label of a place that is none: uniform over 1000 steps, as for a vertex that was not visited before.
+pub(super) const LN_ANY_LABEL: f32 = -6.907_755;
+
+/// ln of the prior of another part of the map that no edge connects with the others: a building is one part.
+pub(super) const LN_PART: f32 = -10.0;
+
+/// ln of the share of visits that the detector misses.
+pub(super) const LN_MISSED_PLACE: f32 = -8.0;
+
 /// How many looks the configured share of missed ways stands for, for a way that was seen more than once.
 const WAY_LOOKS: f32 = 20.0;
 

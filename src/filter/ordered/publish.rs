@@ -150,13 +150,14 @@ impl<const V: usize, const D: usize, const T: usize> Hypothesis<V, D, T> {
     /// The vertex of this hypothesis where the robot is by another one: that of the newest place before at which the other one was
     /// at its vertex. [`NONE`] for a vertex that the other one visits for the first time.
     fn counterpart(&self, other: &Self, places: usize) -> u8 {
+        // A place that is not on the map counts for the newest one that is.
+        let Some(newest) = (0..places).rev().find(|&index| other.came_by(index) < UNSEEN) else { return NONE };
+        let vertex = other.map.vertex(other.came_by(newest));
         if self.map_key == other.map_key {
             // The numbers of their ways may differ; vertices are numbered in the order of their first visit.
-            return other.map.vertex(other.at);
+            return vertex;
         }
-        let vertex = other.map.vertex(other.at);
-        let earlier =
-            (0..places.saturating_sub(1)).rev().find(|&index| other.map.vertex(other.came_by(index)) == vertex);
+        let earlier = (0..newest).rev().find(|&index| other.map.vertex(other.came_by(index)) == vertex);
         earlier.map_or(NONE, |index| self.map.vertex(self.came_by(index)))
     }
 }

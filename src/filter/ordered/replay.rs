@@ -93,21 +93,41 @@ impl<const V: usize, const D: usize, const T: usize> Builder<'_, V, D, T> {
     /// How `from` explains observation `index`, as a choice of `to`.
     fn translated(&mut self, from: &Hypothesis<V, D, T>, to: &mut Hypothesis<V, D, T>, index: usize) -> Option<Choice> {
         let came_by = from.came_by(index);
-        if came_by == OFF_MAP && !to.has_room(Choice { exit: NONE, target: Target::New }) {
-            return Some(Choice { exit: NONE, target: Target::OffMap });
+        if came_by == OFF_MAP {
+            return self.off_the_map(to, index);
         }
         if came_by >= UNSEEN {
             return None;
         }
-        let exit = if self.record.get(index).starts() || !to.is_on_map() {
+        let exit = if self.record.get(index).starts() {
             NONE
-        } else {
+        } else if to.is_on_map() {
             let exit = from.map.partner(came_by)?;
             let exit = self.translation.image(from, to, exit)?;
             if to.map.vertex(exit) != to.map.vertex(to.at) {
-                return None;
+                let first = to.exit_before(self.record, index, to.at, exit)?;
+                let dart = self.translation.image(from, to, came_by)?;
+                return (to.map.partner(exit) == Some(dart))
+                    .then_some(Choice { exit: first, target: Target::Beyond(dart) });
             }
             exit
+        } else if let Some(edge) = to.edge_under(self.record, index) {
+            if self.translation.vertex(from.map.vertex(came_by)).is_some()
+                && self.translation.image(from, to, came_by)? == edge
+            {
+                return Some(Choice { exit: edge, target: Target::Back });
+            }
+            match from.map.partner(came_by) {
+                Some(exit)
+                    if self.translation.vertex(from.map.vertex(exit)).is_some()
+                        && self.translation.image(from, to, exit)? == edge =>
+                {
+                    edge
+                }
+                _ => NONE,
+            }
+        } else {
+            NONE
         };
         if self.translation.vertex(from.map.vertex(came_by)).is_none() {
             let is_open = exit == NONE || to.map.partner(exit).is_none();
@@ -121,6 +141,20 @@ impl<const V: usize, const D: usize, const T: usize> Builder<'_, V, D, T> {
             _ => return None,
         };
         Some(Choice { exit, target })
+    }
+
+    /// How a place that is not on the map of another hypothesis is explained: as none, or as one for which the map has no room.
+    fn off_the_map(&self, to: &Hypothesis<V, D, T>, index: usize) -> Option<Choice> {
+        if self.record.get(index).starts() && to.map.vertices() > 0 {
+            return Some(Choice { exit: NONE, target: Target::Spurious(false) });
+        }
+        if to.is_on_map()
+            && let ReportedExit::Way(exit) = to.reported_exit(self.record, index, to.at)
+        {
+            let again = to.is_spurious_again(self.record, index, exit);
+            return Some(Choice { exit, target: Target::Spurious(again) });
+        }
+        (!to.has_room_for_vertex()).then_some(Choice { exit: NONE, target: Target::OffMap })
     }
 
     /// Extends a hypothesis by observation `index` with the choice that explains it and what follows best, but not with a
@@ -186,6 +220,14 @@ impl<const V: usize, const D: usize, const T: usize> Builder<'_, V, D, T> {
         target: Target,
     ) -> bool {
         let came_by = from.came_by(index);
+        if came_by == OFF_MAP && matches!(target, Target::Spurious(_)) {
+            // On the same edge, if they come from the same place.
+            let before = index.checked_sub(1).map(|before| (from.came_by(before), to.came_by(before)));
+            return before.is_some_and(|(from_before, to_before)| {
+                self.translation.vertex(from.map.vertex(from_before)).is_some()
+                    && self.translation.image(from, to, from_before) == Some(to_before)
+            });
+        }
         if came_by >= UNSEEN || !to.is_on_map() {
             return false;
         }
@@ -218,8 +260,20 @@ impl<const V: usize, const D: usize, const T: usize> Builder<'_, V, D, T> {
             Target::New if choice.exit < UNSEEN && self.record.get(index + 1).exit().is_some_and(Exit::is_back) => {
                 self.arrive(on, index + 1, choice.exit) + self.follow_known(on, index + 1, choice.exit)
             }
+            Target::Back => self.follow_known(on, index, choice.exit),
+            Target::Beyond(dart) => self.follow_known(on, index, dart),
+            Target::Spurious(_) if choice.exit == NONE => -OPEN,
+            Target::Spurious(_) => self.follow_along(on, index + 1, choice.exit),
             Target::New | Target::Unseen(..) | Target::OffMap => -OPEN,
         }
+    }
+
+    /// As [`Builder::follow_known`], of a robot that comes to observation `index` along an edge on which a place was none.
+    fn follow_along(&self, on: &Hypothesis<V, D, T>, index: usize, edge: u8) -> f32 {
+        let entry = self.record.get(index);
+        let ends = on.ends_ahead(&entry, edge);
+        let gains = ends.map(|end| self.arrive(on, index, end) + self.follow_known(on, index, end));
+        gains.reduce(f32::max).unwrap_or(-OPEN)
     }
 
     fn arrive(&self, on: &Hypothesis<V, D, T>, index: usize, at: u8) -> f32 {
