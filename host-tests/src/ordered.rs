@@ -15,8 +15,9 @@ const LN_GENUS: f64 = -7.0;
 /// The log prior of another part of the map, and what an edge that connects two parts gains.
 const LN_PART: f64 = -10.0;
 
-/// ln of the share of places that are none, after a place and after the drive was lost; and of the visits that are not detected.
-const LN_SPURIOUS: [f64; 2] = [-6.0, -2.0];
+/// ln of the share of places that are none: after a place, on an edge where one was none before, and after the drive was lost; and of the
+/// visits that are not detected.
+const LN_SPURIOUS: [f64; 3] = [-6.0, -14.0, -2.0];
 const LN_MISSED_PLACE: f64 = -8.0;
 
 /// The range of labels in steps.
@@ -135,6 +136,8 @@ pub struct Walk {
     at: Option<usize>,
     /// After a place that is none: the dart by which the robot left the place before, and ln of the travel time until there.
     on: Option<(usize, Option<f64>)>,
+    /// The edges on which places were none, as darts.
+    spurious: Vec<usize>,
     /// The sum of all logarithms but those of the labels.
     pub ln_rest: f64,
 }
@@ -183,7 +186,12 @@ impl Walk {
         if let (Some(exit), Some(at)) = (exit, self.at) {
             self.ln_rest += self.ln_exit(model, visit, at, exit) - visit.ln_travel.map_or(0.0, |_| 2.5_f64.ln());
         }
-        self.ln_rest += LN_SPURIOUS[usize::from(exit.is_none())] - LABELS.ln();
+        let again = |exit| {
+            [Some(exit), self.rotation.partner[exit]].into_iter().flatten().any(|end| self.spurious.contains(&end))
+        };
+        let case = exit.map_or(2, |exit| usize::from(again(exit)));
+        self.ln_rest += LN_SPURIOUS[case] - LABELS.ln();
+        self.spurious.extend(exit);
         if let Some(others) = &visit.others {
             self.ln_rest -= 7_f64.ln() + others.len() as f64 * (TAU.ln() - self.ln_unseen(model, 0.0));
         }
@@ -191,14 +199,16 @@ impl Walk {
         self.at = None;
     }
 
-    /// Drives back from a place that is none, or on to the other end of the edge if it is known.
+    /// Drives back from a place that is none, or on to the other end of the edge if it is known; or comes there from anywhere, if that is
+    /// likelier.
     pub fn drive_from_no_place(&mut self, model: Model, visit: &Visit, arrival: usize) {
         let (edge, first) = self.on.take().expect("the place before is none");
         self.ln_rest += self.ln_ways(model, visit, arrival);
+        let mut along = 0.0;
         if let Some(second) = visit.ln_travel {
             let known = &self.ways[edge.min(arrival)].ln_travels;
             let deviation = |count: f64| model.travel.powi(2) * (1.0 + 1.0 / count.min(COUNTS));
-            self.ln_rest += match first {
+            along = match first {
                 Some(first) if arrival == edge => ln_normal(second - first, deviation(1.0)),
                 Some(first) if !known.is_empty() => {
                     let (count, sum) = (known.len() as f64, (first.exp() + second.exp()).ln());
@@ -207,6 +217,7 @@ impl Walk {
                 _ => -(2.5_f64.ln()),
             };
         }
+        self.ln_rest += f64::max(along, -(self.darts() as f64).ln());
         self.see(visit, arrival);
         self.at = Some(arrival);
     }

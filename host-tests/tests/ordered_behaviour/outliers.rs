@@ -15,7 +15,7 @@ fn a_place_that_is_none_is_at_no_vertex_of_a_known_map() {
         for (seed, goes_back) in (0..6).flat_map(|seed| [(seed, false), (seed, true)]) {
             let mut filter = started(seed);
             let mut robot = Robot::new(building, seed);
-            robot.drive(&mut filter, 60);
+            robot.drive(&mut filter, 90);
             assert!(is_complete(building, filter.darts().unwrap()), "seed {seed}");
             observe(&mut filter, robot.step_to_no_place(3000));
             none += usize::from(filter.recent(0).is_none() && filter.arrival().is_none());
@@ -36,7 +36,7 @@ fn a_vertex_that_is_not_detected_stays_on_the_map() {
         for seed in 0..6 {
             let mut filter = started(seed);
             let mut robot = Robot::new(building, seed);
-            robot.drive(&mut filter, 60);
+            robot.drive(&mut filter, 90);
             observe(&mut filter, robot.step_past());
             robot.drive(&mut filter, 4);
             assert!(is_complete(building, filter.darts().unwrap()), "seed {seed}");

@@ -115,9 +115,10 @@ impl<const V: usize, const D: usize, const T: usize> Hypothesis<V, D, T> {
         }
     }
 
-    /// The ways by which the robot may come to the vertices beyond that at the other end of an edge.
+    /// The ways by which the robot may come to the vertices beyond that at the other end of an edge. None for a loop: the path does not show
+    /// that the robot passed its own vertex.
     pub(super) fn ways_beyond(&self, exit: u8) -> impl Iterator<Item = u8> + '_ {
-        let passed = self.map.partner(exit);
+        let passed = self.map.partner(exit).filter(|&passed| self.map.vertex(passed) != self.map.vertex(exit));
         let ways = passed.map_or(&[][..], |passed| self.map.ways(self.map.vertex(passed)));
         ways.iter().filter(move |&&way| Some(way) != passed).filter_map(|&way| self.map.partner(way))
     }
