@@ -18,6 +18,7 @@ mod logarithm;
 mod model;
 mod noise;
 mod outliers;
+mod proposals;
 mod publish;
 mod record;
 mod removal;
