@@ -14,6 +14,9 @@ const SAME_GAP_MRAD: u16 = 500;
 const HOME_PERMILLE: i32 = 10_000;
 /// A door is at most this long with its jambs, in thousandths of the way of a frame at full speed: a corridor is longer.
 const DOOR_PERMILLE: u16 = 50_000;
+/// The robot gives up to drive to a gap after so many times the frames of the distance at full speed, and so many more.
+const TIMES_LONGER: i32 = 3;
+const FRAMES_MORE: u16 = 60;
 /// With a command beyond this bearing the robot turns in place, in milliradians.
 const IN_PLACE_MRAD: u16 = 600;
 
@@ -49,6 +52,8 @@ pub(super) struct WayBack {
     radius_mm: u16,
     /// Whether the robot drives back to that point, without regard to the obstacles beside it.
     is_taken: bool,
+    /// For how many frames more it does so.
+    frames_left: u16,
     /// The distance of the last frame, in thousandths of the way of a frame at full speed.
     forward_permille: u16,
 }
@@ -62,6 +67,7 @@ impl WayBack {
             length_permille: 0,
             radius_mm: 0,
             is_taken: false,
+            frames_left: 0,
             forward_permille: 0,
         }
     }
@@ -85,7 +91,9 @@ impl WayBack {
     /// On an edge: takes the present point if it is narrower, and ends the way back at its end. A robot that `is_returning` takes none.
     pub(super) fn follow_edge<const SONARS: usize>(&mut self, frame: &Frame<'_, SONARS>, is_returning: bool) {
         // Nearer than the gap's own sides there is another wall: the robot is not where it is estimated to be.
+        self.frames_left = self.frames_left.saturating_sub(1);
         self.is_taken = self.is_taken
+            && self.frames_left > 0
             && frame
                 .scan
                 .nearest_between(-AHEAD_MRAD, AHEAD_MRAD)
@@ -135,7 +143,10 @@ impl WayBack {
         let is_hidden = wall.is_some_and(|wall| u32::from(wall.range_mm) * 5 < u32::from(self.radius_mm) * 8);
         let openings = frame.scan.narrow_openings(&frame.obstacles);
         let is_narrow = gap.is_door && openings.nearest(gap_mrad, SAME_GAP_MRAD).is_some();
-        self.is_taken = (is_hidden || is_narrow) && self.gap.length() > HOME_PERMILLE;
+        let length_permille = self.gap.length();
+        self.is_taken = (is_hidden || is_narrow) && length_permille > HOME_PERMILLE;
+        self.frames_left =
+            FRAMES_MORE.saturating_add((length_permille / 1000 * TIMES_LONGER).try_into().unwrap_or(u16::MAX));
     }
 
     /// The robot has left a place: the point of the new edge is searched.
