@@ -258,7 +258,9 @@ impl<const SONARS: usize> RingScan<'_, SONARS> {
     #[inline(never)]
     fn obstacle(&self, (range_mm, bearing_mrad): (u16, i16)) -> Obstacle {
         let limit_mm = range_mm.saturating_add(self.equidistance_mm);
-        let beside_mrad = (self.separation_mrad / 2).max(self.spacing_mrad() + BEARING_TOLERANCE_MRAD);
+        // A sensor as far as the separation may measure another obstacle.
+        let next_mrad = (self.spacing_mrad() + BEARING_TOLERANCE_MRAD).min(self.separation_mrad.saturating_sub(1));
+        let beside_mrad = (self.separation_mrad / 2).max(next_mrad);
         let mut count = 0i32;
         let mut sum_mrad = 0i32;
         for (other_mm, other_mrad) in self.ranges() {
