@@ -324,3 +324,16 @@ fn a_room_behind_a_narrower_door_is_entered_and_no_wall_is_touched() {
         assert_eq!(touched, 0, "door of {door_mm} mm");
     }
 }
+
+#[test]
+#[ignore = "prints the table of doors in docs/driving.md"]
+fn table_of_doors() {
+    const SEEDS: u64 = 12;
+    for door_mm in [800.0, 900.0, 1000.0, 1100.0, 1200.0, 1300.0, 1400.0, 1500.0, 1600.0] {
+        let runs: Vec<Rooms> = (1..=SEEDS).map(|seed| explore_rooms(door_mm, seed)).collect();
+        let both = runs.iter().filter(|run| run.changes.iter().all(|changes| *changes >= 2)).count();
+        let lost: u32 = runs.iter().map(|run| run.lost).sum();
+        let touched: u32 = runs.iter().map(|run| run.touched).sum();
+        println!("| {door_mm} mm | {both} of {SEEDS} | {lost} | {touched} |");
+    }
+}
