@@ -150,7 +150,7 @@ class SameMapAsTheLibrary(unittest.TestCase):
             with tempfile.TemporaryDirectory() as folder:
                 (Path(folder) / "ring.toml").write_text(ring)
                 printed = run(TOPOSLAM, "replay", frames, "--ring", Path(folder) / "ring.toml", "--filter", name)
-            vertices = re.findall(r"vertex +\d+: radius +(\d+) mm, (\d+) visits", printed)
+            vertices = re.findall(r"vertex +\d+: radius +(\d+) mm, (\d+) visits?", printed)
             self.assertEqual([(str(v.radius_mm), str(v.visits)) for v in mapper.map.vertices], vertices)
             edges = re.search(r"edges: (.*)", printed)
             assert edges
@@ -278,7 +278,9 @@ class Outputs(unittest.TestCase):
         self.assertEqual(len(map.frontiers), 2)
         self.assertEqual(map.ways[0][0].travel_frames, 50)
         self.assertEqual(map.ways[0][0].leads_to and map.ways[0][0].leads_to[0], 1)
-        self.assertEqual(filter.belief, [0.0, 1.0])
+        # The second place may also be none.
+        self.assertEqual(filter.belief[0], 0.0)
+        self.assertGreater(filter.belief[1], 0.99)
         self.assertEqual(repr(map), "<Map of 2 vertices and 1 edges>")
         self.assertIn("<svg", map._repr_svg_())
         self.assertTrue(map.export("dot") and map.export("geojson") and map.export("graphml") and map.export("json"))
