@@ -7,7 +7,7 @@
 
 use super::choice::{OFF_MAP, ReportedExit, UNSEEN};
 use super::hypothesis::Hypothesis;
-use super::model::{LN_MISSED_PLACE, LN_PART, Model};
+use super::model::{LN_PART, Model};
 use super::record::Record;
 use super::replay::WORST_EXIT;
 use crate::map::{NONE, VertexId, VertexSet};
@@ -385,8 +385,7 @@ impl Decoder {
                             let travel = model.travel(on.map.travel(partner), entry.ln_travel);
                             let is_near = arrive(&mut next, partner, before, cost + travel);
                             if is_reported && !is_near {
-                                let ways = on.map.ways(on.map.vertex(partner)).len();
-                                let missed = LN_MISSED_PLACE - model.ln_of(ways.saturating_sub(1));
+                                let missed = on.passing(model, exit);
                                 for dart in on.ways_beyond(exit) {
                                     let travel = on.travel_beyond(model, &entry, exit, dart);
                                     arrive(&mut next, dart, before, cost + missed + travel);

@@ -107,11 +107,7 @@ impl<const V: usize, const D: usize, const T: usize> Hypothesis<V, D, T> {
             propose(Target::Known);
         } else if may_be_on {
             propose(Target::New);
-            for frontier in self.map.frontiers() {
-                if frontier != edge && !self.is_far(model, entry.steps, self.map.vertex(frontier)) {
-                    propose(Target::At(frontier));
-                }
-            }
+            self.near_frontiers(model, &entry, edge).for_each(|frontier| propose(Target::At(frontier)));
         }
     }
 
@@ -126,9 +122,14 @@ impl<const V: usize, const D: usize, const T: usize> Hypothesis<V, D, T> {
     /// What it gains to have passed the vertex at the other end of an edge, and to have come to one beyond it by `dart`.
     pub(super) fn arrival_beyond(&self, model: &Model, entry: &Entry, exit: u8, dart: u8) -> Gain {
         let mut gain = self.arrival(model, entry, dart);
-        let ways = self.map.partner(exit).map_or(0, |passed| self.map.ways(self.map.vertex(passed)).len());
-        gain.rest += LN_MISSED_PLACE - model.ln_of(ways.saturating_sub(1));
+        gain.rest += self.passing(model, exit);
         gain
+    }
+
+    /// ln P of passing the vertex at the other end of an edge without a detection, and of leaving it by one of its other ways.
+    pub(super) fn passing(&self, model: &Model, exit: u8) -> f32 {
+        let ways = self.map.partner(exit).map_or(0, |passed| self.map.ways(self.map.vertex(passed)).len());
+        LN_MISSED_PLACE - model.ln_of(ways.saturating_sub(1))
     }
 
     /// ln of the density of the travel time by an edge to its other end, all of it or what is left behind a place that was none.

@@ -63,11 +63,7 @@ impl<const V: usize, const D: usize, const T: usize> Hypothesis<V, D, T> {
                 continue;
             }
             propose(Target::New);
-            for frontier in self.map.frontiers() {
-                if frontier != exit && !self.is_far(model, entry.steps, self.map.vertex(frontier)) {
-                    propose(Target::At(frontier));
-                }
-            }
+            self.near_frontiers(model, &entry, exit).for_each(|frontier| propose(Target::At(frontier)));
             for vertex in 0..self.map.vertices() {
                 if !self.is_far(model, entry.steps, vertex)
                     && let Some(bearing) = self.unseen_reference(&entry, vertex)
@@ -76,6 +72,13 @@ impl<const V: usize, const D: usize, const T: usize> Hypothesis<V, D, T> {
                 }
             }
         }
+    }
+
+    /// The other frontiers whose vertices the label is not too far off for.
+    pub(super) fn near_frontiers(&self, model: &Model, entry: &Entry, exit: u8) -> impl Iterator<Item = u8> {
+        let is_near =
+            move |&frontier: &u8| frontier != exit && !self.is_far(model, entry.steps, self.map.vertex(frontier));
+        self.map.frontiers().filter(is_near)
     }
 
     /// What a choice gains, given what the robot reported of its exit.
