@@ -12,7 +12,7 @@ use crate::bearing::{HALF_TURN_MRAD, counter_clockwise_mrad, rotated, turn_mrad}
 use crate::config_error::ConfigError;
 use crate::fault::{FaultCounters, FaultKind};
 use crate::filter::Passage;
-use crate::place::{Obstacles, Openings};
+use crate::place::{Obstacles, Openings, SPACING_MRAD};
 use crate::ring::Echo;
 use crate::top_k::TopK;
 
@@ -20,8 +20,6 @@ use crate::top_k::TopK;
 const SAME_OPENING_MRAD: u16 = 700;
 /// The same in a frame that shows another number of openings.
 const DOUBTFUL_OPENING_MRAD: u16 = 350;
-/// The angle between two sensors up to which the robot keeps to the edge by the smallest distance, in milliradians: that of 16 sensors.
-const SPACING_MRAD: u16 = 392;
 /// Limit of the heading of a turn in place, in milliradians: with the default wheels the ring turns by 72 mrad per frame, so that the
 /// smoothed ranges of a sensor are from one direction.
 const TURN_MRAD: i16 = 300;

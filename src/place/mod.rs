@@ -61,6 +61,7 @@ pub use obstacles::{Obstacle, Obstacles};
 pub use openings::Openings;
 pub(crate) use openings::is_open;
 pub use scan::RingScan;
+pub(crate) use scan::SPACING_MRAD;
 
 #[cfg(test)]
 mod tests;

@@ -22,7 +22,7 @@ const BEARING_TOLERANCE_MRAD: u16 = 4;
 /// the additional gap is added.
 const SAME_WAY_MRAD: u16 = 700;
 /// The angle between two sensors of a ring of 16, in milliradians.
-const SPACING_MRAD: u16 = 392;
+pub(crate) const SPACING_MRAD: u16 = 392;
 /// An obstacle more than this angle from a way is opposite to it, in milliradians.
 const OPPOSITE_MRAD: i32 = 2094;
 
