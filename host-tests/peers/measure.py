@@ -25,7 +25,7 @@ PEERS = {"hmmlearn": "peer_hmmlearn", "alergia": "peer_alergia", "chmm": "peer_c
 """The module of every peer. Each has `find_path(radii_mm, seed)`, which returns a state for every radius."""
 
 TOLD_WAYS = {"chmm-actions": "peer_action_chmm"}
-"""The module of every peer that is told the ways as well: `find_path(radii_mm, seed, ways)`."""
+"""The module of every peer whose input includes the ways: `find_path(radii_mm, seed, ways)`."""
 
 ONE_THREAD = {name: "1" for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")}
 
@@ -50,7 +50,7 @@ def measure(
     seeds: Sequence[int],
     ways: Sequence[Sequence[Ways]] | None = None,
 ) -> Measurement:
-    """Runs a peer on several paths, one after the other, each with its own seed. `ways` are for a peer that is told them."""
+    """Runs a peer on several paths, one after the other, each with its own seed. `ways` are for a peer whose input includes them."""
     request = {"peer": peer, "radii_mm": [list(path) for path in radii_mm], "seeds": list(seeds)}
     if ways is not None:
         request["ways"] = [[(place.others_mrad, place.exit_mrad) for place in path] for path in ways]

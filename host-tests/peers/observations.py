@@ -1,6 +1,6 @@
 """Reads what `toposlam evaluate --export DIR` writes: rows of paths, each with its observations and its truth.
 
-A peer is handed `radii_mm` and nothing else, except one that is told the ways as well. The other hints of the CSV (`turn`,
+A peer is handed `radii_mm` and nothing else, except one whose input includes the ways. The other hints of the CSV (`turn`,
 `degree`) and the true place are not read.
 """
 

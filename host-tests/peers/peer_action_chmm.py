@@ -1,4 +1,4 @@
-"""Peer: a cloned hidden Markov model with actions, which is told what the ordered filter is told except travel times.
+"""Peer: a cloned hidden Markov model with actions, with the input of the ordered filter except travel times.
 
 As `peer_cloned_hmm.py`, with two additions. A symbol is the category of the radius and the number of ways seen. The
 action of a step is the exit: the number of the way by which the robot left, counter-clockwise from the way by which it

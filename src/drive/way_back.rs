@@ -14,7 +14,7 @@ const SAME_GAP_MRAD: u16 = 500;
 const HOME_PERMILLE: i32 = 10_000;
 /// A door is at most this long with its jambs, in thousandths of the way of a frame at full speed: a corridor is longer.
 const DOOR_PERMILLE: u16 = 50_000;
-/// The robot gives up to drive to a gap after so many times the frames of the distance at full speed, and so many more.
+/// The time to drive to a gap: the frames of the distance at full speed times `TIMES_LONGER`, plus `FRAMES_MORE`.
 const TIMES_LONGER: i32 = 3;
 const FRAMES_MORE: u16 = 60;
 /// With a command beyond this bearing the robot turns in place, in milliradians.
